@@ -1,0 +1,1 @@
+"""From tidy rows to statistics, correlations and verdicts."""

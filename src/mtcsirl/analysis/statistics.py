@@ -1,0 +1,275 @@
+"""Statistics of a replication over matrices of runs x tasks; every random draw takes an explicit generator.
+
+Notation: m, s, n are mean, standard deviation (ddof = 1) and number of values, t(q, k) a quantile of Student's t with
+k degrees of freedom. NaN marks a missing seed: it is left out and n says so. Fewer than two values have no spread:
+std and interval are NaN, never 0.
+"""
+
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy import stats
+from scipy.optimize import brentq
+
+Array = NDArray[np.float64]
+
+
+class Interval(NamedTuple):
+    """Lower and upper bound."""
+
+    low: float
+    high: float
+
+    def contains(self, value: float) -> bool:
+        """Whether ``value`` lies inside, bounds included; False for an interval of NaN."""
+        return self.low <= value <= self.high
+
+
+class Summary(NamedTuple):
+    """Mean, standard deviation (ddof = 1) and number of values."""
+
+    mean: float
+    std: float
+    n: int
+
+
+class Estimate(NamedTuple):
+    """A statistic with its interval and the number of values behind it."""
+
+    value: float
+    low: float
+    high: float
+    n: int
+
+
+class Welch(NamedTuple):
+    """Welch's test of two means: difference, its confidence interval, t, degrees of freedom, two-sided p."""
+
+    difference: float
+    low: float
+    high: float
+    t: float
+    degrees: float
+    p: float
+
+
+UNKNOWN = Interval(np.nan, np.nan)
+
+
+def summarise(values: ArrayLike) -> Summary:
+    """Mean, std (ddof = 1) and n of ``values`` [runs]; NaN are missing seeds."""
+    known = _known(values)
+    mean = float(known.mean()) if known.size else np.nan
+    std = float(known.std(ddof=1)) if known.size > 1 else np.nan
+    return Summary(mean, std, int(known.size))
+
+
+def t_interval(summary: Summary, confidence: float = 0.95) -> Interval:
+    """Interval m +- t((1 + confidence) / 2, n - 1) s / sqrt(n) of the mean."""
+    if summary.n < 2:
+        return UNKNOWN
+    half = _t(confidence, summary.n - 1) * summary.std / np.sqrt(summary.n)
+    return Interval(summary.mean - half, summary.mean + half)
+
+
+def prediction_interval(original: Summary, runs: int, confidence: float = 0.95) -> Interval:
+    """Where the mean of ``runs`` new seeds lies if nothing but the seeds differs from the original.
+
+    m +- t((1 + confidence) / 2, n0 - 1) s sqrt(1 / n0 + 1 / n1) with n0 the original's seeds and n1 = ``runs``.
+    """
+    if original.n < 2 or runs < 1:
+        return UNKNOWN
+    half = _t(confidence, original.n - 1) * original.std * np.sqrt(1 / original.n + 1 / runs)
+    return Interval(original.mean - half, original.mean + half)
+
+
+def welch(first: Summary, second: Summary, confidence: float = 0.95) -> Welch:
+    """Welch's test of ``first`` - ``second``, from summaries so that a paper's printed numbers can enter.
+
+    Degrees of freedom after Welch and Satterthwaite. With no spread on both sides the interval is the difference.
+    """
+    difference = first.mean - second.mean
+    if first.n < 2 or second.n < 2:
+        return Welch(difference, np.nan, np.nan, np.nan, np.nan, np.nan)
+    a, b = first.std**2 / first.n, second.std**2 / second.n
+    error = np.sqrt(a + b)
+    if error == 0:
+        p = 1.0 if difference == 0 else 0.0
+        return Welch(difference, difference, difference, np.nan, np.nan, p)
+    degrees = float((a + b) ** 2 / (a**2 / (first.n - 1) + b**2 / (second.n - 1)))
+    half = _t(confidence, degrees) * error
+    t = difference / error
+    p = float(2 * stats.t.sf(abs(t), degrees))
+    return Welch(difference, difference - half, difference + half, float(t), degrees, p)
+
+
+def equivalent(first: Summary, second: Summary, margin: float, confidence: float = 0.95) -> bool:
+    """Whether the means differ by less than ``margin``: two one-sided tests (TOST) at level 1 - ``confidence``.
+
+    Holds if the (2 confidence - 1) Welch interval of the difference, 90 % by default, lies inside +- margin. A wide
+    interval is never equivalent, so that few or noisy seeds cannot pass for "no difference".
+    """
+    test = welch(first, second, 2 * confidence - 1)
+    return bool(-margin < test.low and test.high < margin)
+
+
+def hedges_g(first: Summary, second: Summary, confidence: float = 0.95) -> Estimate:
+    """Hedges' g = J (m1 - m2) / s_pooled, J = 1 - 3 / (4 k - 1), k = n1 + n2 - 2, with its interval.
+
+    The interval inverts the noncentral t distribution (exact for equal variances). Without spread g is 0 or infinite
+    and has no interval.
+    """
+    degrees = first.n + second.n - 2
+    if first.n < 2 or second.n < 2:
+        return Estimate(np.nan, np.nan, np.nan, first.n + second.n)
+    pooled = np.sqrt(((first.n - 1) * first.std**2 + (second.n - 1) * second.std**2) / degrees)
+    difference = first.mean - second.mean
+    if pooled == 0:
+        g = 0.0 if difference == 0 else float(np.copysign(np.inf, difference))
+        return Estimate(g, np.nan, np.nan, first.n + second.n)
+    correction = 1 - 3 / (4 * degrees - 1)
+    d = difference / pooled
+    root = np.sqrt(first.n * second.n / (first.n + second.n))
+    low, high = _noncentrality(d * root, degrees, confidence)
+    return Estimate(float(correction * d), correction * low / root, correction * high / root, first.n + second.n)
+
+
+def interquartile_mean(matrix: ArrayLike) -> float:
+    """Mean of the middle half of all values, runs and tasks pooled (25 % trimmed from each end)."""
+    known = _known(matrix)
+    return float(stats.trim_mean(known, 0.25)) if known.size else np.nan
+
+
+def probability_of_improvement(first: ArrayLike, second: ArrayLike) -> float:
+    """P(X > Y) + P(X = Y) / 2 per task, averaged over tasks; [runs, tasks] each, runs may differ."""
+    a, b = _matrix(first), _matrix(second)
+    if a.shape[1] != b.shape[1]:
+        raise ValueError(f"both need the same tasks: {a.shape[1]} and {b.shape[1]} columns")
+    return float(np.mean([_superiority(x[~np.isnan(x)], y[~np.isnan(y)]) for x, y in zip(a.T, b.T, strict=True)]))
+
+
+def stratified_bootstrap(
+    matrices: Sequence[ArrayLike],
+    statistic: Callable[..., float],
+    generator: np.random.Generator,
+    *,
+    resamples: int = 2000,
+    confidence: float = 0.95,
+) -> Estimate:
+    """Percentile bootstrap of ``statistic(*matrices)`` that draws runs anew within each task.
+
+    Each matrix is [runs, tasks]. Below ten runs such intervals are too short (84 % at n = 5): print t-intervals beside.
+    """
+    known = [[column[~np.isnan(column)] for column in _matrix(matrix).T] for matrix in matrices]
+    n = sum(column.size for columns in known for column in columns)
+    if any(column.size == 0 for columns in known for column in columns):
+        return Estimate(np.nan, np.nan, np.nan, n)
+    value = statistic(*[_stack(columns) for columns in known])
+    draws = [
+        statistic(*[_stack([generator.choice(column, column.size) for column in columns]) for columns in known])
+        for _ in range(resamples)
+    ]
+    return Estimate(float(value), *_percentiles(draws, confidence), n)
+
+
+def cluster_bootstrap(
+    statistic: Callable[[NDArray[np.intp]], float],
+    clusters: Sequence[ArrayLike],
+    generator: np.random.Generator,
+    *,
+    resamples: int = 1000,
+    confidence: float = 0.95,
+) -> Estimate:
+    """Percentile bootstrap of ``statistic(indices)`` that draws whole clusters, outermost first.
+
+    ``clusters`` are label vectors [rows], for example (seed, episode): seeds are drawn with replacement, then within
+    each drawn seed its episodes; rows of an episode stay together since they are not independent. n = clusters of the
+    innermost level.
+    """
+    labels = np.column_stack([np.unique(np.asarray(level), return_inverse=True)[1] for level in clusters])
+    rows = np.arange(len(labels))
+    n = len(np.unique(labels, axis=0))
+    tree = _tree(rows, labels)
+    draws = [statistic(np.concatenate(_draw(tree, generator))) for _ in range(resamples)]
+    return Estimate(float(statistic(rows)), *_percentiles(draws, confidence), n)
+
+
+def fisher_z_interval(r: float, n: int, confidence: float = 0.95) -> Interval:
+    """tanh(artanh r +- z / sqrt(n - 3)) for a correlation of ``n`` independent pairs."""
+    if n < 4 or np.isnan(r):
+        return UNKNOWN
+    if abs(r) >= 1:
+        return Interval(r, r)
+    half = stats.norm.ppf((1 + confidence) / 2) / np.sqrt(n - 3)
+    return Interval(float(np.tanh(np.arctanh(r) - half)), float(np.tanh(np.arctanh(r) + half)))
+
+
+def mean_correlation(correlations: ArrayLike, confidence: float = 0.95) -> Estimate:
+    """Mean correlation over seeds on Fisher's z scale with the t-interval of that mean, back in r."""
+    clipped = np.clip(_known(correlations), -1 + 1e-12, 1 - 1e-12)
+    summary = summarise(np.arctanh(clipped))
+    low, high = t_interval(summary, confidence)
+    return Estimate(float(np.tanh(summary.mean)), float(np.tanh(low)), float(np.tanh(high)), summary.n)
+
+
+def _known(values: ArrayLike) -> Array:
+    array = np.asarray(values, dtype=float).ravel()
+    return array[~np.isnan(array)]
+
+
+def _matrix(values: ArrayLike) -> Array:
+    array = np.asarray(values, dtype=float)
+    if array.ndim != 2:
+        raise ValueError(f"needs a matrix [runs, tasks], got shape {array.shape}")
+    return array
+
+
+def _stack(columns: list[Array]) -> Array:
+    """Columns of unequal length as one matrix, NaN below the shorter ones."""
+    stacked = np.full((max(column.size for column in columns), len(columns)), np.nan)
+    for task, column in enumerate(columns):
+        stacked[: column.size, task] = column
+    return stacked
+
+
+def _superiority(x: Array, y: Array) -> float:
+    if not (x.size and y.size):
+        return np.nan
+    difference = x[:, None] - y[None, :]
+    return float(np.mean((difference > 0) + 0.5 * (difference == 0)))
+
+
+def _percentiles(draws: Sequence[float], confidence: float) -> Interval:
+    low, high = np.nanpercentile(draws, [50 * (1 - confidence), 50 * (1 + confidence)])
+    return Interval(float(low), float(high))
+
+
+def _t(confidence: float, degrees: float) -> float:
+    return float(stats.t.ppf((1 + confidence) / 2, degrees))
+
+
+def _noncentrality(t: float, degrees: int, confidence: float) -> Interval:
+    """Noncentrality parameters under which ``t`` is the upper and the lower tail quantile."""
+
+    def solve(probability: float) -> float:
+        width = 10.0 + abs(t)
+        return float(brentq(lambda c: stats.nct.cdf(t, degrees, c) - probability, t - width, t + width))
+
+    return Interval(solve((1 + confidence) / 2), solve((1 - confidence) / 2))
+
+
+def _tree(rows: NDArray[np.intp], labels: NDArray[np.intp]) -> list:
+    """Rows grouped by the first label column, then by the next; leaves are arrays of row numbers."""
+    groups = [labels[:, 0] == value for value in np.unique(labels[:, 0])]
+    if labels.shape[1] == 1:
+        return [rows[group] for group in groups]
+    return [_tree(rows[group], labels[group, 1:]) for group in groups]
+
+
+def _draw(tree: list, generator: np.random.Generator) -> list[NDArray[np.intp]]:
+    picked = [tree[i] for i in generator.integers(len(tree), size=len(tree))]
+    if isinstance(picked[0], list):
+        return [leaf for branch in picked for leaf in _draw(branch, generator)]
+    return picked

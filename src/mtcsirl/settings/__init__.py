@@ -1,0 +1,50 @@
+"""Frozen, validated settings: the one source of the defaults, the schema and the commented configuration.
+
+The defaults are the desk scale; ``config/config.yaml`` is written from these classes, ``smoke.yaml`` and ``paper.yaml``
+are small overlays.
+"""
+
+from mtcsirl.settings.irl import DiscriminatorSettings, IrlSettings, ScoreSettings, TransferSettings
+from mtcsirl.settings.learner import (
+    EnvironmentSettings,
+    EvaluationSettings,
+    GateSettings,
+    LearnerSettings,
+    ProgressSettings,
+    RewardScaleSettings,
+    SacSettings,
+)
+from mtcsirl.settings.study import (
+    BaselineSettings,
+    DemonstrationSettings,
+    ExpertSettings,
+    MultiTargetSettings,
+    MultiTaskSettings,
+    Settings,
+    SingleTargetSettings,
+    TransferStudySettings,
+    steps_for,
+)
+
+__all__ = [
+    "BaselineSettings",
+    "DemonstrationSettings",
+    "DiscriminatorSettings",
+    "EnvironmentSettings",
+    "EvaluationSettings",
+    "ExpertSettings",
+    "GateSettings",
+    "IrlSettings",
+    "LearnerSettings",
+    "MultiTargetSettings",
+    "MultiTaskSettings",
+    "ProgressSettings",
+    "RewardScaleSettings",
+    "SacSettings",
+    "ScoreSettings",
+    "Settings",
+    "SingleTargetSettings",
+    "TransferSettings",
+    "TransferStudySettings",
+    "steps_for",
+]

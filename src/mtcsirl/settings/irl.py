@@ -1,0 +1,88 @@
+"""Settings of inverse reinforcement learning: discriminator, generator, iterations."""
+
+from typing import Literal
+
+from mtcsirl.settings.base import Frozen, key
+from mtcsirl.settings.learner import RewardScaleSettings, Temperature
+
+
+class DiscriminatorSettings(Frozen):
+    """The learned reward f and how it is trained."""
+
+    hidden_sizes: tuple[int, ...] = key((128, 128), "hidden layers of f", unit="units", min_length=1)
+    learning_rate: float = key(1.0e-4, "Adam step size of f", gt=0)
+    minibatch: int = key(256, "expert and again generator transitions per task and update", unit="transitions", gt=0)
+    output_scale: float = key(10.0, "f = output_scale x network", gt=0)
+    gradient_penalty: float = key(0.1, "weight of the gradient penalty on interpolates; 0 = none", ge=0)
+    log_pi_clamp: float = key(10.0, "log pi is clamped to +- this in the logit", unit="nats", gt=0)
+    shaping: bool = key(False, "add gamma h(s') - h(s) to the logit and leave it out of the learned reward")
+    bottleneck_hidden_sizes: tuple[int, ...] = key(
+        (32, 32), "VAIRL: hidden layers of the encoder", unit="units", min_length=1
+    )
+    bottleneck_size: int = key(32, "VAIRL: size of z", unit="units", gt=0)
+    information_constraint: float = key(0.5, "VAIRL: I_c on the summed KL", unit="nats", gt=0)
+    initial_beta: float = key(0.0, "VAIRL: start of the multiplier beta", ge=0)
+    beta_step: float = key(1.0e-5, "VAIRL: dual step on beta; 0 keeps it fixed", ge=0)
+    vairl_gradient_penalty: float = key(1.0, "VAIRL-GP: weight of the zero-centred penalty on expert samples", ge=0)
+
+
+class IrlSettings(Frozen):
+    """Algorithms 1 and 2."""
+
+    iterations: int = key(120, "N: outer iterations after the warm-up", unit="iterations", gt=0)
+    warm_up_iterations: int = key(
+        50,
+        "iterations on the task reward alone before IRL, methods that know it",
+        unit="iterations",
+        paper=0,
+        ge=0,
+    )
+    steps_per_iteration: int = key(
+        500,
+        "environment steps that each generator collects per iteration",
+        unit="environment steps",
+        paper=500,
+        gt=0,
+    )
+    discriminator_updates: int = key(40, "D_updates per task and iteration", unit="updates", paper=15, gt=0)
+    generator_updates: int = key(250, "G_updates per task and iteration", unit="updates", paper=15, gt=0)
+    generator_replay: int = key(
+        20,
+        "generator samples come from the last this many iterations; 1 = latest rollout",
+        unit="iterations",
+        paper=1,
+        gt=0,
+    )
+    schedule: Literal["as_printed", "batched"] = key(
+        "batched", "loop over tasks as printed, or one tensor program over all tasks", paper="as_printed"
+    )
+    curriculum: bool = key(True, "weight f in the policy reward by r_ave / R_MAX", paper=True)
+    curriculum_window: int = key(256, "window of r_ave", unit="environment steps", paper=256, gt=0)
+    task_reward_scale: float = key(1.0, "factor on r_task in logit and policy reward", paper=1.0, gt=0)
+    cs_weight: float = key(1.0, "alpha: factor on f in the policy reward beside the curriculum", paper=1.0, gt=0)
+    temperature: Temperature = key(1.0, "generators: automatic or fixed entropy temperature", paper="automatic")
+    initial_temperature: float = key(1.0, "generators: start of the automatic temperature", gt=0)
+    discriminator: DiscriminatorSettings = key(DiscriminatorSettings, "the learned reward")
+
+    def reward_scale(self) -> RewardScaleSettings:
+        """Temperature and scale of the generators' SAC."""
+        return RewardScaleSettings(
+            temperature=self.temperature, initial_temperature=self.initial_temperature, reward_scale=1.0
+        )
+
+
+class TransferSettings(RewardScaleSettings):
+    """New agents from scratch on r_task + f with f frozen."""
+
+    temperature: Temperature = key(1.0, "automatic or a fixed entropy temperature", paper="automatic")
+    initial_temperature: float = key(1.0, "start of the automatic temperature", gt=0)
+    reward_scale: float = key(1.0, "factor on the whole reward that SAC sees", paper=1.0, gt=0)
+    cs_weight: float = key(1.0, "factor on f beside r_task (section 3.3: standard aggregation)", paper=1.0, gt=0)
+    curriculum: bool = key(False, "weight f by r_ave / R_MAX as during IRL (section 3.3: no)", paper=False)
+
+
+class ScoreSettings(Frozen):
+    """Transition sets on which a learned reward is held against the truth."""
+
+    transitions: int = key(5_000, "transitions per set", unit="transitions", gt=1)
+    bootstrap: int = key(500, "resamples of the cluster bootstrap by episode", unit="resamples", gt=0)

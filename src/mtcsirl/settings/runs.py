@@ -1,0 +1,129 @@
+"""The settings of one job: the slice of the study's settings that its result depends on, and nothing else.
+
+A job's ``settings.json`` is exactly this, so a changed key reruns the jobs that read it and no others.
+"""
+
+from typing import Any
+
+from pydantic import Field
+
+from mtcsirl.settings.base import Frozen
+from mtcsirl.settings.irl import IrlSettings, ScoreSettings
+from mtcsirl.settings.learner import (
+    EnvironmentSettings,
+    EvaluationSettings,
+    GateSettings,
+    ProgressSettings,
+    SacSettings,
+)
+from mtcsirl.settings.study import Settings, steps_for
+
+
+class AgentRunSettings(Frozen):
+    """One SAC agent: expert, baseline or transfer agent."""
+
+    environment: EnvironmentSettings = Field(default_factory=EnvironmentSettings)
+    sac: SacSettings = Field(default_factory=SacSettings)
+    steps: int = Field(default=40_000, gt=0, description="environment steps of training")
+    cs_weight: float = Field(
+        default=0.0, ge=0, description="weight of the cs-reward (ground truth or learned) beside r_task"
+    )
+    curriculum: bool = Field(default=False, description="weight the cs-reward by r_ave / R_MAX over 256 steps")
+    evaluation: EvaluationSettings = Field(default_factory=EvaluationSettings)
+    gates: GateSettings = Field(default_factory=GateSettings)
+    progress: ProgressSettings = Field(default_factory=ProgressSettings)
+
+
+class DemonstrationRunSettings(Frozen):
+    """The demonstrations of one expert."""
+
+    environment: EnvironmentSettings = Field(default_factory=EnvironmentSettings)
+    episodes: int = Field(default=20, gt=0)
+    episode_steps: int = Field(default=500, gt=0, le=500)
+
+
+class IrlRunSettings(Frozen):
+    """One IRL run over T generators."""
+
+    environment: EnvironmentSettings = Field(default_factory=EnvironmentSettings)
+    sac: SacSettings = Field(default_factory=SacSettings)
+    irl: IrlSettings = Field(default_factory=IrlSettings)
+    demonstration_episodes: int = Field(default=20, gt=0, description="episodes of each expert that are read")
+    evaluation: EvaluationSettings = Field(default_factory=EvaluationSettings)
+    gates: GateSettings = Field(default_factory=GateSettings)
+    progress: ProgressSettings = Field(default_factory=ProgressSettings)
+
+
+class ScoreRunSettings(Frozen):
+    """The correlation of one learned reward with the truth."""
+
+    environment: EnvironmentSettings = Field(default_factory=EnvironmentSettings)
+    score: ScoreSettings = Field(default_factory=ScoreSettings)
+    discount: float = Field(default=0.99, ge=0, lt=1)
+
+
+def _agent(settings: Settings, sac: SacSettings, steps: int, **extra: Any) -> AgentRunSettings:
+    return AgentRunSettings(
+        environment=settings.environment,
+        sac=sac,
+        steps=steps,
+        evaluation=settings.evaluation,
+        gates=settings.gates,
+        progress=settings.progress,
+        **extra,
+    )
+
+
+def expert_run(settings: Settings, task: str, cs_reward: str) -> AgentRunSettings:
+    """The settings of an expert for ``task`` and ``cs_reward``."""
+    expert = settings.expert
+    return _agent(
+        settings,
+        expert.sac(settings.sac),
+        steps_for(expert.steps, task),
+        cs_weight=expert.cs_weight.get(cs_reward, 1.0),
+        curriculum=expert.curriculum,
+    )
+
+
+def baseline_run(settings: Settings, task: str) -> AgentRunSettings:
+    """The settings of plain SAC on ``task``."""
+    return _agent(settings, settings.baseline.sac(settings.sac), steps_for(settings.baseline.steps, task))
+
+
+def transfer_run(settings: Settings, task: str) -> AgentRunSettings:
+    """The settings of a transfer agent on ``task``."""
+    transfer = settings.transfer
+    return _agent(
+        settings,
+        transfer.sac(settings.sac),
+        steps_for(transfer.steps, task),
+        cs_weight=transfer.cs_weight,
+        curriculum=transfer.curriculum,
+    )
+
+
+def demonstration_run(settings: Settings, experiments: tuple[str, ...] = ("multi_target",)) -> DemonstrationRunSettings:
+    """The settings of one expert's demonstrations: as many episodes as the hungriest of ``experiments`` reads."""
+    episodes = max(settings.demonstrations.episodes[name] for name in experiments)  # type: ignore[index]
+    return DemonstrationRunSettings(
+        environment=settings.environment, episodes=episodes, episode_steps=settings.evaluation.episode_steps
+    )
+
+
+def irl_run(settings: Settings, experiment: str) -> IrlRunSettings:
+    """The settings of one IRL run of ``experiment``."""
+    return IrlRunSettings(
+        environment=settings.environment,
+        sac=settings.irl.reward_scale().sac(settings.sac),
+        irl=settings.irl,
+        demonstration_episodes=settings.demonstrations.episodes[experiment],  # type: ignore[index]
+        evaluation=settings.evaluation,
+        gates=settings.gates,
+        progress=settings.progress,
+    )
+
+
+def score_run(settings: Settings) -> ScoreRunSettings:
+    """The settings of the correlation of a learned reward with the truth."""
+    return ScoreRunSettings(environment=settings.environment, score=settings.score, discount=settings.sac.discount)

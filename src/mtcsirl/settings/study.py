@@ -1,0 +1,178 @@
+"""The root of the configuration: what the study consists of."""
+
+from typing import Annotated, Literal
+
+from pydantic import AfterValidator, Field, model_validator
+
+from mtcsirl.settings.base import Frozen, key
+from mtcsirl.settings.irl import IrlSettings, ScoreSettings, TransferSettings
+from mtcsirl.settings.learner import (
+    EnvironmentSettings,
+    EvaluationSettings,
+    GateSettings,
+    LearnerSettings,
+    ProgressSettings,
+    RewardScaleSettings,
+)
+from mtcsirl.tasks import TARGETS_PER_TASK, TASKS
+
+SINGLE_TASKS = ("reach-wall", "button-press-topdown-wall", "drawer-close", "push-back", "coffee-button")
+TRAIN_TASKS = ("window-open", "reach", "plate-slide", "faucet-open", "coffee-button", "door-close")
+UNSEEN_TASKS = ("reach-wall", "button-press-topdown-wall", "drawer-close", "push-back")
+METHODS = ("mt_airl", "mt_vairl", "mt_vairl_gp", "mt_csirl", "mt_csirl_lt")
+CS_REWARDS = ("velocity", "action_norm")
+
+
+def _known_task(name: str) -> str:
+    if name not in TASKS:
+        raise ValueError(
+            f"unknown task {name!r}; allowed: Meta-World's names without '-v3', e.g. {', '.join(TASKS[:6])}, ..."
+        )
+    return name
+
+
+def _unique(values: tuple) -> tuple:
+    if len(set(values)) != len(values):
+        raise ValueError("lists an entry twice")
+    return values
+
+
+def _known_budget_keys(budget: dict[str, int]) -> dict[str, int]:
+    if "default" not in budget:
+        raise ValueError("needs the key 'default'")
+    for name in budget:
+        if name != "default":
+            _known_task(name)
+    return budget
+
+
+Task = Annotated[str, AfterValidator(_known_task)]
+Tasks = Annotated[tuple[Task, ...], Field(min_length=1), AfterValidator(_unique)]
+Target = Annotated[int, Field(ge=0, lt=TARGETS_PER_TASK)]
+Targets = Annotated[tuple[Target, ...], Field(min_length=1), AfterValidator(_unique)]
+Seed = Annotated[int, Field(ge=0)]
+Seeds = Annotated[tuple[Seed, ...], Field(min_length=1), AfterValidator(_unique)]
+Budget = Annotated[dict[str, Annotated[int, Field(gt=0)]], AfterValidator(_known_budget_keys)]
+"""Environment steps: the key ``default`` and one key per task that differs."""
+
+
+def steps_for(budget: dict[str, int], task: str) -> int:
+    """The number of environment steps that ``budget`` grants to ``task``."""
+    return budget.get(task, budget["default"])
+
+
+class SingleTargetSettings(Frozen):
+    """Section 5.1: one task, one target; the reward is tried on the same task and target."""
+
+    tasks: Tasks = key(SINGLE_TASKS, "tasks, each on its own", paper=SINGLE_TASKS)
+
+
+class MultiTargetSettings(Frozen):
+    """Section 5.2: one task, several targets; the reward is tried on a new target of every task."""
+
+    tasks: Tasks = key(SINGLE_TASKS, "rows and columns of Tables 1 and 3", paper=SINGLE_TASKS)
+    train_targets: Targets = key((1, 2, 3), "targets with experts; T = their number", paper=(1, 2, 3, 4, 5))
+
+
+class MultiTaskSettings(Frozen):
+    """Sections 5.3 and 5.4: several tasks; the reward is tried on unseen tasks."""
+
+    train_tasks: Tasks = key(TRAIN_TASKS, "tasks with experts; rows of Table 4", paper=TRAIN_TASKS)
+    train_targets: Targets = key((1,), "targets per task; T = tasks x targets", paper=(1, 2, 3, 4, 5))
+    unseen_tasks: Tasks = key(UNSEEN_TASKS, "tasks of Table 2 and Figure 3", paper=UNSEEN_TASKS)
+
+    @model_validator(mode="after")
+    def _really_unseen(self) -> "MultiTaskSettings":
+        both = set(self.train_tasks) & set(self.unseen_tasks)
+        if both:
+            raise ValueError(f"unseen_tasks also in train_tasks: {', '.join(sorted(both))}; take it out of one list")
+        return self
+
+
+class ExpertSettings(RewardScaleSettings):
+    """SAC on r_task + weighted ground-truth cs-reward."""
+
+    steps: Budget = key(
+        lambda: {"default": 40_000},
+        "training budget per task",
+        unit="environment steps",
+        paper={"default": 250_000},
+    )
+    cs_weight: dict[Literal["velocity", "action_norm"] | str, Annotated[float, Field(gt=0)]] = key(
+        lambda: {"velocity": 20.0, "action_norm": 5.0},
+        "C_v, C_n: weight of the ground-truth cs-reward beside r_task in [0, 10]",
+    )
+    curriculum: bool = key(
+        True, "weight the ground-truth cs-reward by r_ave / R_MAX, as section 3.3 does for f", paper=False
+    )
+
+
+class BaselineSettings(RewardScaleSettings):
+    """SAC on r_task alone."""
+
+    steps: Budget = key(
+        lambda: {"default": 40_000},
+        "training budget per task",
+        unit="environment steps",
+        paper={"default": 250_000},
+    )
+
+
+class DemonstrationSettings(Frozen):
+    """Episodes of the stochastic expert."""
+
+    episodes: dict[Literal["single_target", "multi_target", "multi_task"], Annotated[int, Field(gt=0)]] = key(
+        lambda: {"single_target": 20, "multi_target": 20, "multi_task": 20},
+        "episodes of 500 steps per task and target, by experiment",
+        unit="episodes",
+        paper={"single_target": 120, "multi_target": 120, "multi_task": 20},
+    )
+
+
+class TransferStudySettings(TransferSettings):
+    """Transfer agents with their budget."""
+
+    steps: Budget = key(
+        lambda: {"default": 40_000},
+        "training budget per task",
+        unit="environment steps",
+        paper={"default": 250_000},
+    )
+
+
+class Settings(Frozen):
+    """The whole configuration; the defaults are the desk scale."""
+
+    scale: Literal["smoke", "desk", "paper"] = key(
+        "desk", "smoke: numbers mean nothing; desk: 24 hours on two cores; paper: the paper's numbers"
+    )
+    results: str = key("results", "folder of all runs, tables and the report", min_length=1)
+    figures: str = key("paper_figs", "folder of all figures", min_length=1)
+    seeds: Seeds = key(
+        (0, 1, 2, 3, 4), "seeds of every reported agent; development uses 100 and up", paper=(0, 1, 2, 3, 4)
+    )
+    irl_seeds: Seeds = key(
+        (0, 1, 2, 3, 4),
+        "seeds of IRL runs; a transfer agent takes the run of its own seed, or cycles through them",
+        paper=(0, 1, 2, 3, 4),
+    )
+    cs_rewards: Annotated[tuple[str, ...], Field(min_length=1), AfterValidator(_unique)] = key(
+        CS_REWARDS, "common-sense rewards", paper=CS_REWARDS
+    )
+    methods: Annotated[tuple[str, ...], Field(min_length=1), AfterValidator(_unique)] = key(
+        METHODS, "IRL methods of the multi-task experiment", paper=METHODS
+    )
+    single_target: SingleTargetSettings = key(SingleTargetSettings, "section 5.1")
+    multi_target: MultiTargetSettings = key(MultiTargetSettings, "section 5.2")
+    multi_task: MultiTaskSettings = key(MultiTaskSettings, "sections 5.3 and 5.4")
+    environment: EnvironmentSettings = key(EnvironmentSettings, "observation and targets")
+    sac: LearnerSettings = key(LearnerSettings, "what all agents share")
+    expert: ExpertSettings = key(ExpertSettings, "experts")
+    baseline: BaselineSettings = key(BaselineSettings, "plain SAC")
+    demonstrations: DemonstrationSettings = key(DemonstrationSettings, "demonstrations")
+    irl: IrlSettings = key(IrlSettings, "inverse reinforcement learning")
+    transfer: TransferStudySettings = key(TransferStudySettings, "new agents on the learned reward")
+    score: ScoreSettings = key(ScoreSettings, "correlation of learned and true reward")
+    evaluation: EvaluationSettings = key(EvaluationSettings, "final evaluation of every agent")
+    gates: GateSettings = key(GateSettings, "what counts as learned")
+    progress: ProgressSettings = key(ProgressSettings, "reports, checkpoints, selection")

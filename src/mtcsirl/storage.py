@@ -1,0 +1,163 @@
+"""The only module that touches files: atomic writers and readers that never unpickle.
+
+Every writer writes a temporary file in the same folder, flushes it to disk and renames it into place, so a crash or a
+full disk leaves the old file or none, never half of one. Every reader turns a missing, truncated or foreign file into
+one :class:`~mtcsirl.errors.UserError` that names it.
+"""
+
+import fcntl
+import hashlib
+import json
+import os
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import IO, TYPE_CHECKING, Any
+
+from mtcsirl.errors import UserError
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import torch
+
+
+@contextmanager
+def atomic(path: Path | str, mode: str = "w") -> Iterator[IO[Any]]:
+    """Open a temporary neighbour of ``path`` and rename it to ``path`` when the block ends without an error."""
+    path = Path(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+    try:
+        with open(temporary, mode, **({} if "b" in mode else {"encoding": "utf-8", "newline": ""})) as handle:
+            yield handle
+            handle.flush()
+            os.fsync(handle.fileno())
+        os.replace(temporary, path)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def _read(path: Path | str, parse: Callable[[Path], Any], what: str) -> Any:
+    path = Path(path)
+    if not path.is_file():
+        raise UserError(f"{path}: no such file; run the stage that makes it first")
+    try:
+        return parse(path)
+    except UserError:
+        raise
+    except Exception as error:
+        line = str(error).strip().splitlines()[0] if str(error).strip() else type(error).__name__
+        raise UserError(f"{path}: not a readable {what} ({line}); delete it and make it again") from error
+
+
+def write_text(path: Path | str, text: str) -> None:
+    """Write a text file."""
+    with atomic(path) as handle:
+        handle.write(text)
+
+
+def write_bytes(path: Path | str, data: bytes) -> None:
+    """Write a binary file."""
+    with atomic(path, "wb") as handle:
+        handle.write(data)
+
+
+def read_text(path: Path | str) -> str:
+    """Read a text file."""
+    return _read(path, lambda p: p.read_text(encoding="utf-8"), "text file")
+
+
+def write_json(path: Path | str, data: Any) -> None:
+    """Write JSON with sorted keys, so equal data gives equal bytes."""
+    write_text(path, json.dumps(data, indent=2, sort_keys=True, allow_nan=False) + "\n")
+
+
+def read_json(path: Path | str) -> Any:
+    """Read JSON."""
+    return _read(path, lambda p: json.loads(p.read_text(encoding="utf-8")), "JSON file")
+
+
+def write_csv(path: Path | str, frame: "pd.DataFrame") -> None:
+    """Write a tidy frame; floats with 9 significant digits, enough for float32."""
+    with atomic(path) as handle:
+        frame.to_csv(handle, index=False, float_format="%.9g", lineterminator="\n")
+
+
+def read_csv(path: Path | str, columns: tuple[str, ...] = ()) -> "pd.DataFrame":
+    """Read a tidy frame and check that ``columns`` are there; empty cells of text columns stay empty strings."""
+    import pandas as pd
+
+    text = dict.fromkeys(("task", "cs_reward", "method", "source", "experiment", "policy", "metric"), str)
+
+    def parse(p: Path) -> "pd.DataFrame":
+        return pd.read_csv(p, dtype=text, keep_default_na=True).fillna(dict.fromkeys(text, ""))
+
+    frame = _read(path, parse, "CSV file")
+    return _with_columns(path, frame, columns)
+
+
+def write_parquet(path: Path | str, frame: "pd.DataFrame") -> None:
+    """Write a frame as Parquet (zstd)."""
+    with atomic(path, "wb") as handle:
+        frame.to_parquet(handle, index=False, compression="zstd")
+
+
+def read_parquet(path: Path | str, columns: tuple[str, ...] = ()) -> "pd.DataFrame":
+    """Read a Parquet frame and check that ``columns`` are there."""
+    import pandas as pd
+
+    return _with_columns(path, _read(path, pd.read_parquet, "Parquet file"), columns)
+
+
+def _with_columns(path: Path | str, frame: "pd.DataFrame", columns: tuple[str, ...]) -> "pd.DataFrame":
+    missing = [name for name in columns if name not in frame.columns]
+    if missing:
+        raise UserError(f"{path}: lacks the column {', '.join(missing)}; delete it and make it again")
+    return frame
+
+
+def write_tensors(path: Path | str, tensors: Mapping[str, "torch.Tensor"]) -> None:
+    """Write named tensors as safetensors."""
+    from safetensors.torch import save
+
+    data = save({name: tensor.detach().cpu().contiguous().clone() for name, tensor in tensors.items()})
+    write_bytes(path, data)
+
+
+def read_tensors(path: Path | str) -> "dict[str, torch.Tensor]":
+    """Read named tensors from safetensors; no code in the file can run."""
+    from safetensors.torch import load
+
+    return _read(path, lambda p: load(p.read_bytes()), "safetensors file")
+
+
+def checksum(path: Path | str) -> str:
+    """SHA-256 of a file."""
+    return _read(path, lambda p: hashlib.sha256(p.read_bytes()).hexdigest(), "file")
+
+
+def remove(path: Path | str) -> None:
+    """Delete a file if it is there."""
+    Path(path).unlink(missing_ok=True)
+
+
+def append_line(path: Path | str, line: str) -> None:
+    """Append one line to a log that may be cut off anywhere."""
+    path = Path(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with open(path, "a", encoding="utf-8") as handle:
+        handle.write(line.rstrip("\n") + "\n")
+
+
+@contextmanager
+def locked(folder: Path | str) -> Iterator[Path]:
+    """Hold ``folder`` (made if missing) for one process: an orphan job cannot write beside its successor."""
+    folder = Path(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    with open(folder / ".lock", "w") as handle:
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError as error:
+            raise UserError(f"{folder}: another process writes here; wait for it or stop it") from error
+        yield folder
+    (folder / ".lock").unlink(missing_ok=True)
