@@ -13,7 +13,9 @@ class DiscriminatorSettings(Frozen):
     learning_rate: float = key(1.0e-4, "Adam step size of f", gt=0)
     minibatch: int = key(256, "expert and again generator transitions per task and update", unit="transitions", gt=0)
     output_scale: float = key(10.0, "f = output_scale x network", gt=0)
-    gradient_penalty: float = key(0.1, "weight of the gradient penalty on interpolates; 0 = none", ge=0)
+    gradient_penalty: float = key(
+        0.1, "all but VAIRL: weight of the zero-centred gradient penalty on interpolates; 0 = none", paper=0, ge=0
+    )
     log_pi_clamp: float = key(10.0, "log pi is clamped to +- this in the logit", unit="nats", gt=0)
     shaping: bool = key(False, "add gamma h(s') - h(s) to the logit and leave it out of the learned reward")
     bottleneck_hidden_sizes: tuple[int, ...] = key(
@@ -21,9 +23,11 @@ class DiscriminatorSettings(Frozen):
     )
     bottleneck_size: int = key(32, "VAIRL: size of z", unit="units", gt=0)
     information_constraint: float = key(0.5, "VAIRL: I_c on the summed KL", unit="nats", gt=0)
-    initial_beta: float = key(0.0, "VAIRL: start of the multiplier beta", ge=0)
+    initial_beta: float = key(0.005, "VAIRL: start of the multiplier beta", ge=0)
     beta_step: float = key(1.0e-5, "VAIRL: dual step on beta; 0 keeps it fixed", ge=0)
-    vairl_gradient_penalty: float = key(1.0, "VAIRL-GP: weight of the zero-centred penalty on expert samples", ge=0)
+    vairl_gradient_penalty: float = key(
+        1.0, "VAIRL-GP: weight w of the zero-centred penalty w/2 E||grad||^2 on expert samples", ge=0
+    )
 
 
 class IrlSettings(Frozen):
@@ -32,7 +36,7 @@ class IrlSettings(Frozen):
     iterations: int = key(120, "N: outer iterations after the warm-up", unit="iterations", gt=0)
     warm_up_iterations: int = key(
         50,
-        "iterations on the task reward alone before IRL, methods that know it",
+        "iterations on the task reward alone before IRL; methods that do not know it spend them on IRL too",
         unit="iterations",
         paper=0,
         ge=0,
@@ -58,6 +62,16 @@ class IrlSettings(Frozen):
     )
     curriculum: bool = key(True, "weight f in the policy reward by r_ave / R_MAX", paper=True)
     curriculum_window: int = key(256, "window of r_ave", unit="environment steps", paper=256, gt=0)
+    unknown_task_curriculum: bool = key(
+        False,
+        "MT-CSIRL+LT: take r_ave of the curriculum from the environment, though the method does not know it",
+    )
+    logit_temperature: Literal["as_printed", "generator"] = key(
+        "generator",
+        "logit = f - log pi as printed, or f / tau - log pi with the generator's tau; they agree for tau = 1"
+        " but for MT-CSIRL+LT, whose two rewards take tau / 2 each",
+        paper="as_printed",
+    )
     task_reward_scale: float = key(1.0, "factor on r_task in logit and policy reward", paper=1.0, gt=0)
     cs_weight: float = key(1.0, "alpha: factor on f in the policy reward beside the curriculum", paper=1.0, gt=0)
     temperature: Temperature = key(1.0, "generators: automatic or fixed entropy temperature", paper="automatic")

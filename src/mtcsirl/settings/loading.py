@@ -1,0 +1,151 @@
+"""From YAML files and single overrides to validated settings; every mistake becomes one line."""
+
+import difflib
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any, TypeVar
+
+import yaml
+from pydantic import BaseModel, ValidationError
+
+from mtcsirl.errors import UserError
+from mtcsirl.settings.study import Settings
+from mtcsirl.storage import read_text
+
+Model = TypeVar("Model", bound=BaseModel)
+CONFIG_FOLDERS = (Path("config"), Path(__file__).resolve().parents[3] / "config")
+"""Where the configuration is looked for: below the working directory, then in the checkout."""
+
+
+def load(files: Iterable[Path | str] = (), overrides: Iterable[str] = (), scale: str | None = None) -> Settings:
+    """Settings from ``config/config.yaml``, the overlay of ``scale``, further ``files``, then ``key=value`` overrides.
+
+    Later ones win; mappings merge and lists are replaced, as with ``snakemake --configfile``. Without a
+    ``config.yaml`` the defaults of the classes stand in for it: they are the same.
+    """
+    named = [path for path in (_config("config.yaml"),) if path is not None]
+    if scale not in (None, "desk"):
+        overlay = _config(f"{scale}.yaml")
+        if overlay is None:
+            raise UserError(f"config/{scale}.yaml: no such file; allowed scales: smoke, desk, paper")
+        named.append(overlay)
+    data: dict[str, Any] = {}
+    for path in [*named, *files]:
+        data = merge(data, read_yaml(path))
+    return validate(Settings, override(data, overrides))
+
+
+def read_yaml(path: Path | str) -> dict[str, Any]:
+    """A YAML (or JSON) file that holds a mapping; an empty file is an empty one."""
+    try:
+        data = yaml.safe_load(read_text(path))
+    except yaml.YAMLError as error:
+        raise UserError(f"{path}: not valid YAML: {' '.join(str(error).split())}") from error
+    if data is not None and not isinstance(data, dict):
+        raise UserError(f"{path}: must be a mapping of keys to values, is {type(data).__name__}")
+    return data or {}
+
+
+def merge(base: Mapping[str, Any], overlay: Mapping[str, Any]) -> dict[str, Any]:
+    """``base`` with ``overlay`` on top: mappings merge, everything else is replaced."""
+    merged = dict(base)
+    for name, value in overlay.items():
+        old = merged.get(name)
+        merged[name] = merge(old, value) if isinstance(old, Mapping) and isinstance(value, Mapping) else value
+    return merged
+
+
+def override(data: Mapping[str, Any], assignments: Iterable[str]) -> dict[str, Any]:
+    """``data`` with assignments such as ``sac.minibatch=64`` on top; values are read as YAML."""
+    merged = dict(data)
+    for assignment in assignments:
+        name, equals, text = assignment.partition("=")
+        if not equals or not name.strip():
+            raise UserError(f"--set {assignment}: must be key=value, for example sac.minibatch=64")
+        try:
+            value = yaml.safe_load(text)
+        except yaml.YAMLError as error:
+            raise UserError(f"--set {assignment}: the value is not valid YAML") from error
+        for part in reversed(name.strip().split(".")):
+            value = {part: value}
+        merged = merge(merged, value)
+    return merged
+
+
+def validate(model: type[Model], data: Mapping[str, Any]) -> Model:
+    """``data`` as settings of ``model``; raises UserError, one line with key, value and what is allowed."""
+    try:
+        validated = model.model_validate(dict(data))
+    except ValidationError as error:
+        raise UserError(_one_line(model, data, error)) from error
+    _reject_booleans(data, validated.model_dump(), "")
+    return validated
+
+
+def _config(name: str) -> Path | None:
+    return next((folder / name for folder in CONFIG_FOLDERS if (folder / name).is_file()), None)
+
+
+def _one_line(model: type[BaseModel], data: Mapping[str, Any], error: ValidationError) -> str:
+    """The first wrong key, all that is said about it, and how many others are wrong."""
+    said: dict[str, list[str]] = {}
+    values: dict[str, Any] = {}
+    for item in error.errors(include_url=False):
+        if item["type"] == "too_short" and item["input"]:
+            continue  # pydantic's echo of a wrong entry
+        path = _real_path(item["loc"], data)
+        name = ".".join(path)
+        said.setdefault(name, []).append(_message(model, path, item))
+        values.setdefault(name, item["input"])
+    first = next(iter(said))
+    shown = "" if isinstance(values[first], Mapping) else f" = {values[first]!r}"
+    others = f" (and {len(said) - 1} more wrong: {', '.join(list(said)[1:])})" if len(said) > 1 else ""
+    return f"configuration: {first or 'settings'}{shown}: {' or '.join(dict.fromkeys(said[first]))}{others}"
+
+
+def _real_path(location: tuple[int | str, ...], data: Any) -> tuple[str, ...]:
+    """The part of a pydantic location that is in ``data``: without the tags of unions and validators."""
+    path: list[str] = []
+    for part in location:
+        if isinstance(data, Mapping) and part in data:
+            data = data[part]
+        elif isinstance(data, list | tuple) and isinstance(part, int) and part < len(data):
+            data = data[part]
+        else:
+            break
+        path.append(str(part))
+    return tuple(path)
+
+
+def _message(model: type[BaseModel], path: tuple[str, ...], item: Any) -> str:
+    if item["type"] == "extra_forbidden":
+        return _unknown_key(model, path)
+    if item["type"] == "too_short":
+        return "must not be empty"
+    if item["type"] == "tuple_type":
+        return "must be a list"
+    if item["type"] in ("model_type", "dict_type"):
+        return "must be a mapping of keys to values"
+    return item["msg"].removeprefix("Value error, ").replace("Input should be", "must be")
+
+
+def _unknown_key(model: type[BaseModel], path: tuple[str, ...]) -> str:
+    for part in path[:-1]:
+        inner = model.model_fields[part].annotation
+        if isinstance(inner, type) and issubclass(inner, BaseModel):
+            model = inner
+    close = difflib.get_close_matches(path[-1], model.model_fields, n=1)
+    hint = f", did you mean {close[0]}?" if close else ""
+    return f"unknown key{hint}; allowed: {', '.join(model.model_fields)}"
+
+
+def _reject_booleans(raw: Any, validated: Any, name: str) -> None:
+    """YAML's yes and no would pass for the numbers 1 and 0."""
+    if isinstance(raw, Mapping) and isinstance(validated, Mapping):
+        for part, value in raw.items():
+            _reject_booleans(value, validated.get(part), f"{name}.{part}".lstrip("."))
+    elif isinstance(raw, list | tuple) and isinstance(validated, list | tuple):
+        for index, (old, new) in enumerate(zip(raw, validated, strict=False)):
+            _reject_booleans(old, new, f"{name}.{index}")
+    elif isinstance(raw, bool) and not isinstance(validated, bool):
+        raise UserError(f"configuration: {name} = {raw}: must be a {type(validated).__name__}, not a truth value")
