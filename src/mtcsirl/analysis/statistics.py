@@ -6,12 +6,14 @@ std and interval are NaN, never 0.
 """
 
 from collections.abc import Callable, Sequence
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import stats
 from scipy.optimize import brentq
+from scipy.special import ndtr
 
 Array = NDArray[np.float64]
 
@@ -250,12 +252,27 @@ def _t(confidence: float, degrees: float) -> float:
     return float(stats.t.ppf((1 + confidence) / 2, degrees))
 
 
+@cache
+def _chi_nodes(degrees: int) -> tuple[Array, Array]:
+    """sqrt(q(u) / k) at the nodes u in [0, 1] of Gauss and Legendre, and the weights (they sum to 2)."""
+    nodes, weights = np.polynomial.legendre.leggauss(300)
+    return np.sqrt(stats.chi2.ppf((nodes + 1) / 2, degrees) / degrees), weights
+
+
 def _noncentrality(t: float, degrees: int, confidence: float) -> Interval:
-    """Noncentrality parameters under which ``t`` is the upper and the lower tail quantile."""
+    """Noncentrality parameters c under which ``t`` is the upper and the lower tail quantile.
+
+    P(T <= t | c) = integral over u in [0, 1] of Phi(t sqrt(q(u) / k) - c), q the quantile function of chi-squared with
+    k degrees of freedom; Gauss-Legendre, since scipy's noncentral t has no numbers in its far tails.
+    """
+    root, weights = _chi_nodes(degrees)
+    scaled = t * root
 
     def solve(probability: float) -> float:
-        width = 10.0 + abs(t)
-        return float(brentq(lambda c: stats.nct.cdf(t, degrees, c) - probability, t - width, t + width))
+        def miss(c: float) -> float:
+            return float(weights @ ndtr(scaled - c)) / 2 - probability
+
+        return float(brentq(miss, scaled.min() - 5, scaled.max() + 5))
 
     return Interval(solve((1 + confidence) / 2), solve((1 - confidence) / 2))
 
