@@ -1,0 +1,1 @@
+"""Rewards: ground truth, reward networks, learned rewards."""

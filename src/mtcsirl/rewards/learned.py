@@ -1,0 +1,110 @@
+"""A learned reward as an artefact: what IRL leaves behind and new agents train on."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from torch import Tensor
+
+from mtcsirl import storage
+from mtcsirl.errors import UserError
+from mtcsirl.rewards.networks import RewardNetwork
+from mtcsirl.transitions import RewardFunction, Transitions
+
+FORMAT = "mtcsirl learned reward 1"
+WEIGHTS, DESCRIPTION = "reward.safetensors", "reward.json"
+
+
+@dataclass(frozen=True)
+class LearnedReward:
+    """f(s, a, s'), frozen; called on transitions [...] it gives rewards [...].
+
+    ``observation`` names the observation map it was trained on and ``members`` the (task, target) pairs whose
+    demonstrations it saw. MT-CSIRL+LT has ``task_network`` beside f: one task reward per member.
+    """
+
+    network: RewardNetwork
+    method: str
+    cs_reward: str
+    observation: str
+    members: tuple[tuple[str, int], ...]
+    task_network: RewardNetwork | None = None
+    about: dict[str, Any] = field(default_factory=dict)
+    """Anything else worth keeping in the description, such as experiment and seed."""
+
+    def __call__(self, transitions: Transitions) -> Tensor:
+        """The learned reward f [...] of transitions [...]."""
+        return self.network(transitions)
+
+    def task_reward(self, task: str, target: int) -> RewardFunction:
+        """The learned task reward of one (task, target) pair of MT-CSIRL+LT.
+
+        Raises:
+            UserError: the method learns no task rewards, or the pair was not among its tasks.
+        """
+        if self.task_network is None:
+            raise UserError(f"method {self.method!r} learns no task reward; mt_csirl_lt does")
+        if (task, target) not in self.members:
+            known = ", ".join(f"{name}-t{index}" for name, index in self.members)
+            raise UserError(f"no learned task reward for {task}-t{target}; this run has {known}")
+        return self.task_network.member(self.members.index((task, target)))
+
+
+def save_learned_reward(reward: LearnedReward, folder: Path | str) -> None:
+    """Write ``reward.safetensors`` (weights) and ``reward.json`` (architecture, origin, checksum) into ``folder``."""
+    folder = Path(folder)
+    networks = {"f": reward.network} | ({"task": reward.task_network} if reward.task_network else {})
+    storage.write_tensors(folder / WEIGHTS, {name: network.parameters for name, network in networks.items()})
+    storage.write_json(
+        folder / DESCRIPTION,
+        {
+            "format": FORMAT,
+            "method": reward.method,
+            "cs_reward": reward.cs_reward,
+            "observation": reward.observation,
+            "members": [list(member) for member in reward.members],
+            "networks": {name: network.architecture for name, network in networks.items()},
+            "sha256": storage.checksum(folder / WEIGHTS),
+            "about": reward.about,
+        },
+    )
+
+
+def load_learned_reward(folder: Path | str) -> LearnedReward:
+    """Read a reward that ``save_learned_reward`` wrote.
+
+    Raises:
+        UserError: a file is missing, truncated, changed since it was written, or of another kind.
+    """
+    weights, description = Path(folder) / WEIGHTS, Path(folder) / DESCRIPTION
+    said = storage.read_json(description)
+    if not isinstance(said, dict) or said.get("format") != FORMAT:
+        raise UserError(f"{description}: not the description of a learned reward; expected format {FORMAT!r}")
+    tensors = storage.read_tensors(weights)
+    if storage.checksum(weights) != said.get("sha256"):
+        raise UserError(f"{weights}: differs from the checksum in {DESCRIPTION}; learn the reward again")
+    try:
+        members = tuple((str(task), int(target)) for task, target in said["members"])
+        networks = _networks(said["networks"], tensors, len(members))
+        return LearnedReward(
+            network=networks["f"],
+            method=said["method"],
+            cs_reward=said["cs_reward"],
+            observation=said["observation"],
+            members=members,
+            task_network=networks.get("task"),
+            about=said["about"],
+        )
+    except (KeyError, TypeError, ValueError) as error:
+        raise UserError(f"{description}: does not describe {WEIGHTS} ({error}); learn the reward again") from error
+
+
+def _networks(
+    architectures: dict[str, dict[str, Any]], tensors: dict[str, Tensor], members: int
+) -> dict[str, RewardNetwork]:
+    expected: Sequence[tuple[str, int]] = (("f", 1), ("task", members))
+    found = {name: tensors[name] for name, _ in expected if name in architectures}
+    if set(found) != set(tensors) or any(name in found and len(found[name]) != count for name, count in expected):
+        raise ValueError("its tensors are of another run")
+    return {name: RewardNetwork.from_parameters(architectures[name], tensor) for name, tensor in found.items()}
