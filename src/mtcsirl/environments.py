@@ -14,6 +14,7 @@ from gymnasium.spaces import Box
 
 from mtcsirl.errors import UserError
 from mtcsirl.fast_metaworld import FastEnvironment, make_fast_environment
+from mtcsirl.rendering import SceneRenderer
 from mtcsirl.tasks import TARGETS_PER_TASK, TASKS
 
 OBSERVATION_SIZE = 39
@@ -21,6 +22,8 @@ ACTION_SIZE = 4
 EPISODE_STEPS = 500
 STEP_SECONDS = 0.0125
 """Time between two observations: frame_skip 5 times the simulator's time step of 0.0025 s."""
+
+PICTURE_SIZE = 480
 
 HAND = slice(0, 3)
 CURRENT = slice(0, 18)
@@ -119,6 +122,8 @@ class TaskEnvironment(gymnasium.Env[np.ndarray, np.ndarray]):
         self.observation_space = Box(-np.inf, np.inf, (OBSERVATION_SIZE,), np.float32)
         self.action_space = Box(-1.0, 1.0, (ACTION_SIZE,), np.float32)
         self.render_mode = "rgb_array" if render else None
+        size = {"width": PICTURE_SIZE, "height": PICTURE_SIZE}
+        self._renderer = SceneRenderer(simulator.model, **size) if render else None
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -140,19 +145,21 @@ class TaskEnvironment(gymnasium.Env[np.ndarray, np.ndarray]):
         report = {"success": bool(info["success"]), "diverged": self.simulator.diverged}
         return self._seen(observation), float(reward), False, truncated, report
 
-    def render(self) -> np.ndarray:  # type: ignore[override]
+    def render(self) -> np.ndarray:
         """Return the picture [480, 480, 3] of the camera ``corner2``, the right way up.
 
         Raises:
             UserError: the environment was made without ``render=True``.
         """
-        if self.render_mode is None:
+        if self._renderer is None:
             raise UserError("this environment cannot render: make it with render=True")
-        return self.simulator.picture()
+        return self._renderer.render(self.simulator.data)
 
     def close(self) -> None:
         """Free the rendering context."""
-        self.simulator.close()
+        if self._renderer is not None:
+            self._renderer.close()
+            self._renderer = None
 
     def _seen(self, observation: np.ndarray) -> np.ndarray:
         # Mapped in float64 and rounded once: the difference of two frames keeps its digits.
@@ -180,5 +187,5 @@ def make_environment(
         raise UserError(f"target: {target} is not one of the targets 0 to {TARGETS_PER_TASK - 1} of {task}")
     if observation not in OBSERVATION_MAPS:
         raise UserError(f"observation: unknown map '{observation}'; choose {' or '.join(OBSERVATION_MAPS)}")
-    simulator = make_fast_environment(task, target, target_seed, render=render)
+    simulator = make_fast_environment(task, target, target_seed)
     return TaskEnvironment(simulator, OBSERVATION_MAPS[observation], render)

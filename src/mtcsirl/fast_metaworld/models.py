@@ -1,0 +1,21 @@
+"""The simulator's models, compiled once a process."""
+
+import copy
+from functools import lru_cache
+from typing import Any
+
+import mujoco
+
+
+def fresh_simulation(environment: Any) -> tuple[Any, Any]:
+    """Return a model and data of an environment's own: stands in for its ``_initialize_simulation``."""
+    model = copy.copy(_compiled(environment.fullpath))
+    model.vis.global_.offwidth = max(model.vis.global_.offwidth, environment.width)
+    model.vis.global_.offheight = max(model.vis.global_.offheight, environment.height)
+    return model, mujoco.MjData(model)
+
+
+@lru_cache(maxsize=8)
+def _compiled(path: str) -> Any:
+    """Return the compiled model of a file; compiling takes 0.2 s, copying 1 ms."""
+    return mujoco.MjModel.from_xml_path(path)
