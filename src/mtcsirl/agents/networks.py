@@ -7,16 +7,28 @@ from collections.abc import Iterator, Sequence
 import torch
 from torch import Tensor
 
-Activations = list[Tensor]
-"""What `forward` computed: the inputs, every hidden layer after its ReLU, and the outputs."""
+
+class Workspace:
+    """The memory of one pass through a `NetworkStack` at one minibatch size, reused from update to update.
+
+    activations[l] is the input of layer l, the last one the output; deltas[l] is dL/d activations[l]. All are
+    [G, B, size]. What a pass returns stays valid until the next pass through the same workspace.
+    """
+
+    def __init__(self, networks: int, minibatch: int, sizes: Sequence[int], like: Tensor) -> None:
+        def shaped(size: int) -> Tensor:
+            return torch.empty(networks, minibatch, size, device=like.device, dtype=like.dtype)
+
+        self.activations = [shaped(size) for size in sizes]
+        self.deltas = [shaped(size) for size in sizes]
 
 
 class NetworkStack:
     """G independent multilayer perceptrons; all their parameters are one tensor.
 
-    Layer l maps x_l to x_{l+1} = relu(x_l W_l + b_l), the last one without the ReLU.
+    Layer l maps x_l to x_{l+1} = relu(x_l W_l^T + b_l), the last one without the ReLU.
 
-    parameters, gradient: [G, P]; `weights[l]` [G, in, out] and `biases[l]` [G, 1, out] are views of them, so an
+    parameters, gradient: [G, P]; `weights[l]` [G, out, in] and `biases[l]` [G, 1, out] are views of them, so an
     optimiser, a copy or an average of all networks is one operation on one tensor.
     """
 
@@ -38,7 +50,7 @@ class NetworkStack:
         weights, biases, start = [], [], 0
         for fan_in, fan_out in zip(self.sizes, self.sizes[1:], strict=False):
             end = start + fan_in * fan_out
-            weights.append(flat[:, start:end].view(-1, fan_in, fan_out))
+            weights.append(flat[:, start:end].view(-1, fan_out, fan_in))
             biases.append(flat[:, end : end + fan_out].view(-1, 1, fan_out))
             start = end + fan_out
         return weights, biases
@@ -46,36 +58,42 @@ class NetworkStack:
     def initialise(self, network: int, generator: torch.Generator) -> None:
         """Draw one network as `torch.nn.Linear` does: weights and biases uniform in +-1 / sqrt(fan_in)."""
         for weight, bias in zip(self.weights, self.biases, strict=True):
-            bound = weight.shape[1] ** -0.5
+            bound = weight.shape[2] ** -0.5
             for tensor in (weight[network], bias[network]):
-                drawn = torch.empty(tensor.shape).uniform_(-bound, bound, generator=generator)
-                tensor.copy_(drawn)
+                tensor.copy_(torch.empty(tensor.shape).uniform_(-bound, bound, generator=generator))
 
-    def forward(self, inputs: Tensor) -> Activations:
-        """inputs [G, B, in] -> activations of every layer; the last is the output [G, B, out]."""
-        activations = [inputs]
-        for weight, bias in zip(self.weights, self.biases, strict=True):
-            outputs = torch.baddbmm(bias, activations[-1], weight)
-            activations.append(outputs if weight is self.weights[-1] else outputs.relu_())
-        return activations
+    def workspace(self, minibatch: int) -> Workspace:
+        """Memory for passes of this many rows per network."""
+        return Workspace(len(self.parameters), minibatch, self.sizes, self.parameters)
 
-    def backward(self, activations: Activations, output_gradient: Tensor) -> None:
+    def forward(self, inputs: Tensor, workspace: Workspace) -> Tensor:
+        """inputs [G, B, in] -> outputs [G, B, out]; the workspace keeps every layer for the backward pass."""
+        activations = workspace.activations
+        if inputs is not activations[0]:
+            activations[0].copy_(inputs)
+        for layer, (weight, bias) in enumerate(zip(self.weights, self.biases, strict=True)):
+            if layer > 0:
+                activations[layer].relu_()
+            torch.baddbmm(bias, activations[layer], weight.transpose(1, 2), out=activations[layer + 1])
+        return activations[-1]
+
+    def backward(self, output_gradient: Tensor, workspace: Workspace) -> None:
         """Write dL/dW and dL/db of every layer into `gradient`, given dL/d output [G, B, out]."""
-        for layer, delta in self._deltas(activations, output_gradient):
-            torch.bmm(activations[layer].transpose(1, 2), delta, out=self._weight_gradients[layer])
+        for layer, delta in self._deltas(output_gradient, workspace):
+            torch.bmm(delta.transpose(1, 2), workspace.activations[layer], out=self._weight_gradients[layer])
             torch.sum(delta, dim=1, keepdim=True, out=self._bias_gradients[layer])
 
-    def input_gradient(self, activations: Activations, output_gradient: Tensor, columns: slice) -> Tensor:
+    def input_gradient(self, output_gradient: Tensor, workspace: Workspace, columns: slice) -> Tensor:
         """dL/d inputs[..., columns] [G, B, columns], without any parameter gradient."""
-        *_, (_, delta) = self._deltas(activations, output_gradient)
-        return torch.bmm(delta, self.weights[0][:, columns].transpose(1, 2))
+        *_, (_, delta) = self._deltas(output_gradient, workspace)
+        return torch.bmm(delta, self.weights[0][:, :, columns])
 
-    def _deltas(self, activations: Activations, output_gradient: Tensor) -> Iterator[tuple[int, Tensor]]:
-        """Back-propagate: yield (layer, dL/d(x_l W_l + b_l)) from the last layer to the first."""
+    def _deltas(self, output_gradient: Tensor, workspace: Workspace) -> Iterator[tuple[int, Tensor]]:
+        """Back-propagate: yield (layer, dL/d(x_l W_l^T + b_l)) from the last layer to the first."""
         delta = output_gradient
         yield len(self.weights) - 1, delta
         for layer in range(len(self.weights) - 1, 0, -1):
-            delta = torch.bmm(delta, self.weights[layer].transpose(1, 2))
+            delta = torch.bmm(delta, self.weights[layer], out=workspace.deltas[layer])
             relu_backward = torch.ops.aten.threshold_backward.grad_input
-            relu_backward(delta, activations[layer], 0.0, grad_input=delta)
+            relu_backward(delta, workspace.activations[layer], 0.0, grad_input=delta)
             yield layer - 1, delta

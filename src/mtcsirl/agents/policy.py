@@ -17,9 +17,9 @@ FORMAT = "mtcsirl policy 1"
 
 @dataclass(frozen=True)
 class Policy:
-    """A squashed Gaussian actor with ReLU layers x W + b; the last layer gives (mu, log_std).
+    """A squashed Gaussian actor with ReLU layers x W^T + b; the last layer gives (mu, log_std).
 
-    weights[l] [in, out] and biases[l] [out], float32 on the cpu; `observation` says what it was trained on.
+    weights[l] [out, in] and biases[l] [out], float32 on the cpu; `observation` says what it was trained on.
     """
 
     weights: tuple[Tensor, ...]
@@ -32,7 +32,7 @@ class Policy:
     def __post_init__(self) -> None:
         """Keep numpy views of the weights: acting on one observation is three small products."""
         pairs = zip(self.weights, self.biases, strict=True)
-        object.__setattr__(self, "_layers", tuple((w.numpy(), b.numpy()) for w, b in pairs))
+        object.__setattr__(self, "_layers", tuple((w.numpy().T, b.numpy()) for w, b in pairs))
 
     def head(self, observation: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """(mu, log_std) [..., 4] of observations [..., 39]."""
@@ -61,7 +61,7 @@ def save_policy(policy: Policy, folder: Path | str, name: str = "policy") -> Non
         folder / f"{name}.json",
         {
             "format": FORMAT,
-            "sizes": [policy.weights[0].shape[0], *(weight.shape[1] for weight in policy.weights)],
+            "sizes": [policy.weights[0].shape[1], *(weight.shape[0] for weight in policy.weights)],
             "min_log_std": policy.min_log_std,
             "max_log_std": policy.max_log_std,
             "observation": policy.observation,
@@ -79,7 +79,7 @@ def load_policy(folder: Path | str, name: str = "policy") -> Policy:
     if not isinstance(description, dict) or description.get("format") != FORMAT:
         raise UserError(f"{description_file}: not a policy description; expected format {FORMAT!r}")
     sizes = description["sizes"]
-    expected = {f"weight_{layer}": shape for layer, shape in enumerate(zip(sizes, sizes[1:], strict=False))}
+    expected = {f"weight_{layer}": shape for layer, shape in enumerate(zip(sizes[1:], sizes, strict=False))}
     expected |= {f"bias_{layer}": (size,) for layer, size in enumerate(sizes[1:])}
     found = {key: tuple(tensor.shape) for key, tensor in tensors.items()}
     if found != expected or any(tensor.dtype != torch.float32 for tensor in tensors.values()):

@@ -29,5 +29,5 @@ def copy_from_sb3(model: Any, learner: FusedSac) -> None:
 
 def _fill(stack: NetworkStack, network: int, layers: list[tuple[Tensor, Tensor]]) -> None:
     for index, (weight, bias) in enumerate(layers):
-        stack.weights[index][network].copy_(weight.detach().T)
+        stack.weights[index][network].copy_(weight.detach())
         stack.biases[index][network, 0].copy_(bias.detach())

@@ -23,7 +23,7 @@ from mtcsirl.agents.gaussian import (
     squashed_sample_gradient,
 )
 from mtcsirl.agents.graph import CudaGraph
-from mtcsirl.agents.networks import Activations, NetworkStack
+from mtcsirl.agents.networks import NetworkStack, Workspace
 from mtcsirl.agents.optimiser import FlatAdam
 from mtcsirl.agents.policy import Policy
 
@@ -92,13 +92,14 @@ class FusedSac:
         noise_seed = int(np.random.SeedSequence(list(seeds)).generate_state(1, np.uint64)[0] >> 1)
         self._generator = torch.Generator(self.device).manual_seed(noise_seed)
         self._programs: dict[int, Callable[..., None]] = {}
+        self._workspaces: dict[tuple[str, int], Workspace] = {}
 
     # --- acting -----------------------------------------------------------------------------------------------
 
     @torch.no_grad()
     def act(self, observation: Tensor, deterministic: bool = False) -> Tensor:
         """Actions [A, 4] in (-1, 1) for observations [A, 39]: a sample of each policy, or its mode."""
-        head = self.actor.forward(observation.unsqueeze(1))[-1].squeeze(1)
+        head = self.actor.forward(observation.unsqueeze(1), self._workspace("act", 1)).squeeze(1)
         mean, log_std = head.chunk(2, dim=-1)
         if deterministic:
             return torch.tanh(mean)
@@ -108,7 +109,8 @@ class FusedSac:
     @torch.no_grad()
     def log_prob(self, observation: Tensor, action: Tensor) -> Tensor:
         """log pi(a|s) [A, B] of given actions [A, B, 4], clipped to +-(1 - 1e-3), in observations [A, B, 39]."""
-        return squashed_log_prob(self.actor.forward(observation)[-1], action, *self._log_std_bounds)
+        head = self.actor.forward(observation, self._workspace("act", observation.shape[1]))
+        return squashed_log_prob(head, action, *self._log_std_bounds)
 
     def policy(self, agent: int) -> Policy:
         """A frozen copy of one agent's actor."""
@@ -146,14 +148,14 @@ class FusedSac:
     def _gradient_step(
         self, observation: Tensor, action: Tensor, reward: Tensor, next_observation: Tensor, noise: Tensor
     ) -> None:
-        actor_pass, sample = self._sample_actions(observation, noise[0])
+        sample = self._sample_actions("actor", observation, noise[0])
         temperature = self.log_temperature.exp()
         entropy = -sample.log_prob.mean(1)
         self._step_temperature(entropy)
         critic_loss = self._step_critics(
             observation, action, reward, next_observation, noise[1], temperature
         )
-        actor_loss = self._step_actor(observation, actor_pass, sample, temperature)
+        actor_loss = self._step_actor(observation, sample, temperature)
         self.target_critics.parameters.lerp_(self.critics.parameters, self.settings.polyak)
 
         actor_norm = self.actor.gradient.norm(dim=1)
@@ -178,49 +180,55 @@ class FusedSac:
         temperature: Tensor,
     ) -> Tensor:
         """Loss 1/2 sum_i mean (Q_i(s, a) - y)^2 with y = r + gamma (min_i Q'_i(s', a') - alpha log pi(a'|s'))."""
-        _, next_sample = self._sample_actions(next_observation, noise)
-        next_q = self._q_values(self.target_critics, next_observation, next_sample.action)[1].amin(0)
+        next_sample = self._sample_actions("next", next_observation, noise)
+        next_q = self._q_values(self.target_critics, next_observation, next_sample.action).amin(0)
         soft_value = next_q.sub_(temperature[:, None] * next_sample.log_prob)
         target = torch.add(reward, soft_value, alpha=self.settings.discount)
 
-        critic_pass, q_values = self._q_values(self.critics, observation, action)
-        error = q_values - target
-        self.critics.backward(critic_pass, (error / error.shape[-1]).flatten(0, 1).unsqueeze(-1))
+        error = self._q_values(self.critics, observation, action) - target
+        error_gradient = (error / error.shape[-1]).flatten(0, 1).unsqueeze(-1)
+        self.critics.backward(error_gradient, self._workspace("critics", error.shape[-1]))
         self._optimisers["critics"].step()
         return error.square().mean(-1).sum(0).mul_(0.5)
 
-    def _step_actor(
-        self, observation: Tensor, actor_pass: Activations, sample: SquashedSample, temperature: Tensor
-    ) -> Tensor:
+    def _step_actor(self, observation: Tensor, sample: SquashedSample, temperature: Tensor) -> Tensor:
         """Loss mean(alpha log pi(a|s) - min_i Q_i(s, a)) with a drawn from the policy."""
-        critic_pass, q_values = self._q_values(self.critics, observation, sample.action)
-        first_is_less = q_values[0] <= q_values[1]
+        q_values = self._q_values(self.critics, observation, sample.action)
         minibatch = q_values.shape[-1]
+        first_is_less = q_values[0] <= q_values[1]
         q_gradient = torch.stack((first_is_less, ~first_is_less)).to(q_values.dtype).mul_(-1.0 / minibatch)
-        action_columns = slice(observation.shape[-1], None)
         action_gradient = self.critics.input_gradient(
-            critic_pass, q_gradient.flatten(0, 1).unsqueeze(-1), action_columns
+            q_gradient.flatten(0, 1).unsqueeze(-1),
+            self._workspace("critics", minibatch),
+            columns=slice(observation.shape[-1], None),
         )
         head_gradient = squashed_sample_gradient(
             sample,
             action_gradient.unflatten(0, (2, self.agents)).sum(0),
             (temperature / minibatch)[:, None, None],
         )
-        self.actor.backward(actor_pass, head_gradient)
+        self.actor.backward(head_gradient, self._workspace("actor", minibatch))
         self._optimisers["actor"].step()
         return (temperature[:, None] * sample.log_prob - q_values.amin(0)).mean(1)
 
-    def _sample_actions(self, observation: Tensor, noise: Tensor) -> tuple[Activations, SquashedSample]:
-        activations = self.actor.forward(observation)
-        return activations, squashed_sample(activations[-1], noise, *self._log_std_bounds)
+    def _sample_actions(self, role: str, observation: Tensor, noise: Tensor) -> SquashedSample:
+        head = self.actor.forward(observation, self._workspace(role, observation.shape[1]))
+        return squashed_sample(head, noise, *self._log_std_bounds)
 
-    def _q_values(
-        self, critics: NetworkStack, observation: Tensor, action: Tensor
-    ) -> tuple[Activations, Tensor]:
+    def _q_values(self, critics: NetworkStack, observation: Tensor, action: Tensor) -> Tensor:
         """Q values [2, A, B] of both critics of every agent."""
-        inputs = torch.cat((observation, action), dim=-1).repeat(2, 1, 1)
-        activations = critics.forward(inputs)
-        return activations, activations[-1].view(2, self.agents, -1)
+        workspace = self._workspace("critics", observation.shape[1])
+        inputs = workspace.activations[0].unflatten(0, (2, self.agents))
+        inputs[..., : observation.shape[-1]] = observation
+        inputs[..., observation.shape[-1] :] = action
+        return critics.forward(workspace.activations[0], workspace).view(2, self.agents, -1)
+
+    def _workspace(self, role: str, minibatch: int) -> Workspace:
+        """The memory of a pass: of the actor in s or in s', of any critics, or of the actor acting."""
+        if (role, minibatch) not in self._workspaces:
+            stack = self.critics if role == "critics" else self.actor
+            self._workspaces[role, minibatch] = stack.workspace(minibatch)
+        return self._workspaces[role, minibatch]
 
     # --- reading and restoring --------------------------------------------------------------------------------
 
