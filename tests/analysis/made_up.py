@@ -1,0 +1,56 @@
+"""Made-up results of a study, as frames and as files."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from mtcsirl import storage
+from mtcsirl.analysis.rows import KEY, METRICS, OK, POLICIES, ROW_COLUMNS, agents
+from mtcsirl.study import Study
+
+Means = Callable[[dict[str, Any]], dict[str, float]]
+"""Means of the metrics of an agent, from its key."""
+
+
+def noise(agent: dict[str, Any], metric: str, policy: str) -> float:
+    """One number in [-1, 1] for each agent, metric and policy, the same in every process."""
+    text = "|".join(str(agent[name]) for name in KEY) + metric + policy
+    return float(np.random.default_rng(list(text.encode())).uniform(-1, 1))
+
+
+def evaluation(study: Study, means: Means, spread: float = 0.0) -> pd.DataFrame:
+    """Rows as ``evaluation_rows`` gives them, every run present, value = mean (1 + spread x noise)."""
+    rows = []
+    for run in study:
+        for agent in agents(run):
+            values = {"success": 1.0, "velocity": 0.3, "action_norm": 1.6, "task_reward": 8.0} | means(agent)
+            for policy in POLICIES:
+                for metric in METRICS:
+                    value = values[metric] * (1 + spread * noise(agent, metric, policy))
+                    own = {"policy": policy, "metric": metric, "value": value, "episodes": 10, "status": OK}
+                    rows.append(agent | own | {"folder": f"results/{run.folder}"})
+    return pd.DataFrame(rows)[list(ROW_COLUMNS)]
+
+
+def write_run(run: Any, results: Path, means: Means, *, episodes: int = 2, passed: bool = True) -> None:
+    """The files of one run that evaluates agents."""
+    rows, curve = [], []
+    for agent in agents(run):
+        values = {"success": 1.0, "velocity": 0.3, "action_norm": 1.6, "task_reward": 8.0} | means(agent)
+        own = {name: agent[name] for name in ("task", "target", "cs_reward", "seed")}
+        for policy in POLICIES:
+            for metric in METRICS:
+                centre = values[metric] + 0.01 * noise(agent, metric, policy)
+                shifts = np.linspace(-0.1, 0.1, episodes)
+                rows += [
+                    own | {"policy": policy, "episode": i, "metric": metric, "value": centre + shift}
+                    for i, shift in enumerate(shifts)
+                ]
+        curve += [own | {"step": step, "metric": "velocity", "value": values["velocity"]} for step in (500, 1000)]
+    folder = results / run.folder
+    storage.write_csv(folder / "evaluation.csv", pd.DataFrame(rows))
+    storage.write_csv(folder / "curve.csv", pd.DataFrame(curve))
+    storage.write_json(folder / "gate.json", {"gate": "expert", "passed": passed})
