@@ -107,12 +107,10 @@ def _real_path(location: tuple[int | str, ...], data: Any) -> tuple[str, ...]:
     """The part of a pydantic location that is in ``data``: without the tags of unions and validators."""
     path: list[str] = []
     for part in location:
-        if isinstance(data, Mapping) and part in data:
-            data = data[part]
-        elif isinstance(data, list | tuple) and isinstance(part, int) and part < len(data):
-            data = data[part]
-        else:
+        known = range(len(data)) if isinstance(data, list | tuple) else data if isinstance(data, Mapping) else ()
+        if part not in known:
             break
+        data = data[part]
         path.append(str(part))
     return tuple(path)
 

@@ -1,5 +1,6 @@
 """What the settings classes say about themselves: commented configuration, schema, deviations from the paper."""
 
+import json
 import textwrap
 from collections.abc import Iterator
 from typing import Any, NamedTuple
@@ -34,6 +35,7 @@ class Deviation(NamedTuple):
     text: str
 
     def __str__(self) -> str:
+        """One line for a table's footer."""
         unit = f" {self.unit}" if self.unit else ""
         return f"{self.key} = {_flow(self.ours)}{unit} (paper: {_flow(self.paper)}): {self.text}"
 
@@ -61,6 +63,11 @@ def deviations(settings: BaseModel) -> list[Deviation]:
 def template(settings: Settings | None = None) -> str:
     """``settings`` (default: the desk scale) as YAML in which every key is commented; loading it gives ``settings``."""
     return HEAD + "\n".join(_lines(settings or Settings(), "")) + "\n"
+
+
+def as_json(settings: BaseModel) -> str:
+    """``settings`` as one line of JSON with sorted keys: equal settings give equal text."""
+    return json.dumps(settings.model_dump(mode="json"), sort_keys=True, separators=(",", ":"), allow_nan=False)
 
 
 def schema() -> dict[str, Any]:

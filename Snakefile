@@ -1,0 +1,24 @@
+"""The replication as one DAG. Every table and figure is a target of its own: snakemake --cores 2 figure_3"""
+
+from snakemake.utils import min_version
+
+min_version("9.0")
+
+
+configfile: f"{workflow.basedir}/config/config.yaml"
+
+
+include: "workflow/rules/common.smk"
+include: "workflow/rules/experts.smk"
+include: "workflow/rules/demonstrations.smk"
+include: "workflow/rules/irl.smk"
+include: "workflow/rules/transfer.smk"
+include: "workflow/rules/tables.smk"
+include: "workflow/rules/figures.smk"
+include: "workflow/rules/report.smk"
+
+
+rule all:
+    default_target: True
+    input:
+        rules.report.output,

@@ -1,0 +1,127 @@
+"""The validated settings, the study, and the few functions that tell the rules their inputs and parameters."""
+
+import os
+import sys
+from pathlib import Path
+
+from snakemake.exceptions import WorkflowError
+
+from mtcsirl.design import ARTEFACTS, design
+from mtcsirl.errors import UserError
+from mtcsirl.outputs import OUTPUTS
+from mtcsirl.settings import Settings
+from mtcsirl.settings.loading import validate
+from mtcsirl.settings.study import METHODS
+from mtcsirl.settings.template import as_json
+from mtcsirl.tasks import TASKS
+
+try:
+    SETTINGS = validate(Settings, config)
+except UserError as error:
+    sys.exit(str(error))
+
+STUDY = design(SETTINGS)
+RUNS = {run.folder: run for run in STUDY}
+RESULTS = SETTINGS.results
+PACKAGE = Path(os.path.relpath(Path(workflow.basedir) / "src/mtcsirl"))
+# plain `snakemake` of a virtual environment that is not activated finds `mtcsirl` beside itself
+os.environ["PATH"] = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
+
+
+pathvars:
+    results=SETTINGS.results,
+    figures=SETTINGS.figures,
+    logs=f"{SETTINGS.results}/logs",
+    benchmarks=f"{SETTINGS.results}/benchmarks",
+
+
+wildcard_constraints:
+    cs_reward="|".join(SETTINGS.cs_rewards),
+    method="|".join({*SETTINGS.methods, "mt_csirl"}),
+    experiment="single_target|multi_target|multi_task",
+    task="|".join(TASKS),
+    source="|".join((*TASKS, "all")),
+    target=r"\d+",
+    seed=r"\d+",
+
+
+def outputs(stage, folder):
+    """The declared outputs of a run, each file under its name without ending (.csv, else policy.json: policy_json)."""
+    return {name.removesuffix(".csv").replace(".", "_"): f"<results>/{folder}/{name}" for name in OUTPUTS[stage]}
+
+
+def run_of(folder, wildcards):
+    """The run of the study in ``folder``, a pattern of wildcards below the results folder."""
+    folder = folder.format(**wildcards)
+    if folder not in RUNS:
+        raise WorkflowError(f"{folder} is no run of the study at scale {SETTINGS.scale}; add it to the configuration")
+    return RUNS[folder]
+
+
+def settings_of(folder):
+    """The settings that the run in ``folder`` depends on, as JSON: a change of any other key leaves the run alone."""
+    return lambda wildcards: as_json(run_of(folder, wildcards).settings(SETTINGS))
+
+
+def files(run, *names):
+    """The files ``names`` of ``run``."""
+    return [f"{RESULTS}/{run.folder}/{name}" for name in names]
+
+
+def needed_by(folder, role, *names):
+    """The files ``names`` of the run that the run in ``folder`` reads as its ``role``: expert, baseline or irl."""
+    return lambda wildcards: files(getattr(run_of(folder, wildcards), role), *names)
+
+
+def folder_of(name):
+    """The folder that the input files ``name`` are in, which is what the command line asks for."""
+    return lambda wildcards, input: str(Path(getattr(input, name)[0]).parent)
+
+
+def demonstrations_of(folder):
+    """The demonstrations that an IRL run reads: one file per (task, target) that it trains on."""
+
+    def find(wildcards):
+        run = run_of(folder, wildcards)
+        return [
+            f"{RESULTS}/demonstrations/{run.cs_reward}/{task}-t{target}/demonstrations.parquet"
+            for task, target in run.members
+        ]
+
+    return find
+
+
+def rows_of(artefact):
+    """What the table or figure ``artefact`` (None: the whole study) reads: rows and gate marks of its runs."""
+    study = design(SETTINGS, artefact)
+    agents = (*study.experts, *study.baselines, *study.irl_runs, *study.transfers)
+    rows = [path for run in agents for path in files(run, "evaluation.csv", "curve.csv", "gate.json")]
+    return rows + [path for run in study.scores for path in files(run, "scores.csv", "points.parquet")]
+
+
+def learned_task_reward(wildcards):
+    """Whether a transfer agent earns the known task reward or, as in Table 4, the learned one."""
+    return "learned" if run_of(TRANSFER, wildcards).learned_task_reward else "known"
+
+
+def sources(*names):
+    """The modules ``names`` of the package (a folder: all of its modules); listed as input, an edit reruns the rule."""
+    paths = [PACKAGE / name for name in names]
+    found = [file for path in paths for file in (sorted(path.rglob("*.py")) if path.is_dir() else [path])]
+    missing = [str(path) for path in found if not path.is_file()]
+    if missing:
+        raise WorkflowError(f"sources(): no such module: {', '.join(missing)}")
+    return [str(path) for path in found]
+
+
+def own_and_shared(folder, artefact):
+    """The module of ``artefact`` in ``folder`` and those that serve all: an edit of figure_3.py redraws figure 3 only."""
+    kind = artefact.rpartition("_")[0]
+    others = [name for name in ARTEFACTS if name.startswith(kind) and name != artefact]
+    return [path for path in sources(folder) if Path(path).stem not in others]
+
+
+# What decides an agent's numbers beside its settings; glue (storage, stages, command line) is not listed.
+AGENT_SOURCES = sources("environments.py", "fast_metaworld", "agents", "evaluation.py")
+# ... and an IRL run's, beside the file of its method.
+IRL_SOURCES = AGENT_SOURCES + sources("rewards") + [path for path in sources("irl") if Path(path).stem not in METHODS]

@@ -1,0 +1,58 @@
+"""Inverse reinforcement learning, and how well the learned reward agrees with the truth."""
+
+IRL = "irl/{experiment}/{method}/{cs_reward}/{source}/s{seed}"
+SCORE = "scores/{experiment}/{method}/{cs_reward}/{source}/{task}-t{target}/s{seed}"
+
+
+rule learn_reward:
+    """Algorithm 1 or 2 over the demonstrations of T (task, target) pairs."""
+    input:
+        demonstrations=demonstrations_of(IRL),
+        code=IRL_SOURCES,
+        method=lambda wildcards: sources(f"irl/methods/{wildcards.method}.py"),
+    output:
+        **outputs("learn_reward", IRL),
+    log:
+        f"<logs>/{IRL}.log",
+    benchmark:
+        f"<benchmarks>/{IRL}.tsv"
+    threads: 1
+    resources:
+        mem_mb=1200,
+    params:
+        settings=settings_of(IRL),
+        folder=subpath(output.gate_json, parent=True),
+    shell:
+        "mtcsirl learn-reward --method {wildcards.method:q} --cs-reward {wildcards.cs_reward:q}"
+        " --seed {wildcards.seed:q} --demonstrations {input.demonstrations:q}"
+        " --settings {params.settings:q} --output {params.folder:q} > {log:q} 2>&1"
+
+
+rule score_reward:
+    """Correlation of a learned reward with the ground truth on stated transition sets, with controls."""
+    input:
+        reward=multiext(f"<results>/{IRL}/reward", ".json", ".safetensors"),
+        samples=f"<results>/{IRL}/samples.parquet",
+        expert=needed_by(SCORE, "expert", "policy.json", "policy.safetensors"),
+        baseline=needed_by(SCORE, "baseline", "policy.json", "policy.safetensors"),
+        code=AGENT_SOURCES + sources("rewards", "analysis/correlation.py"),
+    output:
+        **outputs("score_reward", SCORE),
+    log:
+        f"<logs>/{SCORE}.log",
+    benchmark:
+        f"<benchmarks>/{SCORE}.tsv"
+    threads: 1
+    resources:
+        mem_mb=1200,
+    params:
+        settings=settings_of(SCORE),
+        reward=folder_of("reward"),
+        expert=folder_of("expert"),
+        baseline=folder_of("baseline"),
+        folder=subpath(output.scores, parent=True),
+    shell:
+        "mtcsirl score-reward --reward {params.reward:q} --expert {params.expert:q} --baseline {params.baseline:q}"
+        " --task {wildcards.task:q} --target {wildcards.target:q} --cs-reward {wildcards.cs_reward:q}"
+        " --seed {wildcards.seed:q}"
+        " --settings {params.settings:q} --output {params.folder:q} > {log:q} 2>&1"

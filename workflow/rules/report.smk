@@ -1,0 +1,40 @@
+"""The verdicts on the paper's claims, and the page that shows everything."""
+
+
+rule claims:
+    """Verdict per claim, from the rows of every run."""
+    input:
+        rows=rows_of(None),
+        published=PACKAGE / "published.yaml",
+        code=sources("analysis", "published.py"),
+    output:
+        json="<results>/claims/claims.json",
+        markdown=report("<results>/claims/claims.md", caption="../report/claims.rst", category="Claims"),
+    log:
+        "<logs>/claims.log",
+    threads: 1
+    params:
+        settings=as_json(SETTINGS),
+        folder=subpath(output.json, parent=True),
+    shell:
+        "mtcsirl claims --settings {params.settings:q} --output {params.folder:q} > {log:q} 2>&1"
+
+
+rule report:
+    """One page that opens in a browser: what was run, verdicts, tables, figures, gates, deviations."""
+    input:
+        tables=expand("<results>/tables/{table}.{ending}", table=TABLES, ending=["csv", "md", "tex"]),
+        figures=expand("<figures>/{figure}.{ending}", figure=FIGURES, ending=["pdf", "png"]),
+        claims=rules.claims.output,
+        provenance=[path for run in STUDY for path in files(run, "provenance.json")],
+        code=sources("report"),
+    output:
+        "<results>/report/index.html",
+    log:
+        "<logs>/report.log",
+    threads: 1
+    params:
+        settings=as_json(SETTINGS),
+        folder=subpath(output[0], parent=True),
+    shell:
+        "mtcsirl report --settings {params.settings:q} --output {params.folder:q} > {log:q} 2>&1"

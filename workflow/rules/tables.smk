@@ -1,0 +1,26 @@
+"""The paper's tables: targets table_1 ... table_5, each as CSV, Markdown and LaTeX."""
+
+TABLES = [name for name in ARTEFACTS if name.startswith("table_")]
+
+for table in TABLES:
+
+    rule:
+        name:
+            table
+        input:
+            rows=rows_of(table),
+            published=PACKAGE / "published.yaml",
+            code=sources("analysis", "published.py") + own_and_shared("tables", table),
+        output:
+            csv=f"<results>/tables/{table}.csv",
+            markdown=report(f"<results>/tables/{table}.md", caption=f"../report/{table}.rst", category="Tables"),
+            latex=f"<results>/tables/{table}.tex",
+        log:
+            f"<logs>/tables/{table}.log",
+        threads: 1
+        params:
+            number=table.removeprefix("table_"),
+            settings=as_json(SETTINGS),
+            folder=subpath(output.csv, parent=True),
+        shell:
+            "mtcsirl table {params.number:q} --settings {params.settings:q} --output {params.folder:q} > {log:q} 2>&1"
