@@ -1,0 +1,160 @@
+"""Arguments that several verbs share, and how settings come from them."""
+
+import argparse
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar
+
+from pydantic import BaseModel
+
+from mtcsirl.errors import UserError
+from mtcsirl.settings import Settings
+from mtcsirl.settings.loading import load, override, read_yaml, validate
+from mtcsirl.tasks import TARGETS_PER_TASK, TASKS
+
+Model = TypeVar("Model", bound=BaseModel)
+Verbs = Any
+"""What ``add_subparsers`` returns; argparse has no public name for it."""
+
+
+def add_verb(
+    verbs: Verbs, name: str, run: Callable[[argparse.Namespace], None], *, does: str, needs: str, writes: str
+) -> argparse.ArgumentParser:
+    """Add a verb whose ``--help`` says what it does, needs and writes."""
+    verb: argparse.ArgumentParser = verbs.add_parser(
+        name,
+        help=does,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        description=f"{does[0].upper()}{does[1:]}.\n\nneeds:  {needs}\nwrites: {writes}",
+    )
+    verb.set_defaults(run=run)
+    return verb
+
+
+def add_run_settings(verb: argparse.ArgumentParser) -> None:
+    """``--settings``, ``--config``, ``--set`` of a verb that does one job."""
+    verb.add_argument(
+        "--settings", metavar="JSON|FILE", help="settings of this one run; default: from the configuration"
+    )
+    add_config(verb)
+    verb.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        metavar="KEY=VALUE",
+        help="one settings key of this run, for example steps=1000 or sac.minibatch=64; may be repeated",
+    )
+
+
+def add_study_settings(verb: argparse.ArgumentParser) -> None:
+    """``--settings``, ``--config``, ``--set`` of a verb that reads the whole study."""
+    verb.add_argument("--settings", metavar="JSON|FILE", help="the whole configuration; default: config/config.yaml")
+    add_config(verb)
+    verb.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="one key; may be repeated")
+
+
+def add_config(verb: argparse.ArgumentParser) -> None:
+    """``--config`` and ``--scale``."""
+    verb.add_argument("--scale", choices=("smoke", "desk", "paper"), help="overlay config/SCALE.yaml; default: desk")
+    verb.add_argument(
+        "--config", action="append", default=[], metavar="FILE", help="overlay on config/config.yaml; may be repeated"
+    )
+
+
+def add_agent(verb: argparse.ArgumentParser, *, cs_reward: bool = True) -> None:
+    """``--task``, ``--target``, ``--cs-reward``, ``--seed``."""
+    add_task(verb)
+    if cs_reward:
+        add_cs_reward(verb)
+    verb.add_argument("--seed", required=True, type=natural, help="seed of every random number of the run")
+
+
+def add_task(verb: argparse.ArgumentParser) -> None:
+    """``--task`` and ``--target``."""
+    verb.add_argument(
+        "--task", required=True, type=task, metavar="TASK", help="Meta-World task without -v3: drawer-close"
+    )
+    verb.add_argument(
+        "--target", type=target, default=0, metavar="INDEX", help=f"variation of the task, 0 ... {TARGETS_PER_TASK - 1}"
+    )
+
+
+def add_cs_reward(verb: argparse.ArgumentParser) -> None:
+    """``--cs-reward``."""
+    verb.add_argument("--cs-reward", required=True, type=cs_reward, metavar="NAME", help="velocity, action_norm, ...")
+
+
+def add_output(verb: argparse.ArgumentParser, default: str | None = None) -> None:
+    """``--output``."""
+    verb.add_argument(
+        "--output", required=default is None, default=default, type=Path, metavar="DIR", help="folder to write to"
+    )
+
+
+def task(name: str) -> str:
+    """A known Meta-World task."""
+    if name not in TASKS:
+        raise argparse.ArgumentTypeError(f"unknown task {name!r}; allowed: {', '.join(TASKS)}")
+    return name
+
+
+def target(text: str) -> int:
+    """The index of a target."""
+    if not text.isdecimal() or int(text) >= TARGETS_PER_TASK:
+        raise argparse.ArgumentTypeError(f"target {text!r}: must be 0 ... {TARGETS_PER_TASK - 1}")
+    return int(text)
+
+
+def natural(text: str) -> int:
+    """A whole number from 0."""
+    if not text.isdecimal():
+        raise argparse.ArgumentTypeError(f"{text!r}: must be a whole number from 0")
+    return int(text)
+
+
+def cs_reward(name: str) -> str:
+    """A registered common-sense reward."""
+    from mtcsirl.rewards.ground_truth import COMMON_SENSE_REWARDS
+
+    return _registered(name, COMMON_SENSE_REWARDS, "common-sense reward")
+
+
+def method(name: str) -> str:
+    """A registered IRL method."""
+    from mtcsirl.irl.methods import METHODS
+
+    return _registered(name, METHODS, "method")
+
+
+def _registered(name: str, registry: Any, what: str) -> str:
+    if name not in registry:
+        raise argparse.ArgumentTypeError(f"unknown {what} {name!r}; allowed: {', '.join(registry)}")
+    return name
+
+
+def run_settings(parsed: argparse.Namespace, model: type[Model], from_study: Callable[[Settings], Model]) -> Model:
+    """The settings of one run: ``--settings``, else what the configuration says; then ``--set``."""
+    if parsed.settings:
+        data = _mapping(parsed.settings)
+    else:
+        data = from_study(load(parsed.config, scale=parsed.scale)).model_dump(mode="json")
+    return validate(model, override(data, parsed.set))
+
+
+def study_settings(parsed: argparse.Namespace) -> Settings:
+    """The whole configuration: ``--settings``, else ``config/config.yaml`` with its overlays; then ``--set``."""
+    if parsed.settings:
+        return validate(Settings, override(_mapping(parsed.settings), parsed.set))
+    return load(parsed.config, parsed.set, parsed.scale)
+
+
+def _mapping(text: str) -> dict[str, Any]:
+    """JSON given on the command line, or the file of that name."""
+    if not text.lstrip().startswith("{"):
+        return read_yaml(text)
+    try:
+        data: dict[str, Any] = json.loads(text)
+    except json.JSONDecodeError as error:
+        raise UserError(f"--settings: not valid JSON ({error})") from error
+    return data

@@ -1,0 +1,78 @@
+"""The verbs that read a study's results: tables, figures, claims, report."""
+
+import argparse
+from pathlib import Path
+
+from mtcsirl.commands.arguments import Verbs, add_study_settings, add_verb, study_settings
+from mtcsirl.design import ARTEFACTS, design
+from mtcsirl.errors import UserError
+
+
+def register(verbs: Verbs) -> None:
+    """Add the verbs."""
+    _add(verbs, "table", _table, does="make one of the paper's tables", writes="table_N.csv, .md, .tex", numbered=True)
+    _add(verbs, "figure", _figure, does="draw one of the paper's figures", writes="figure_N.pdf, .png", numbered=True)
+    _add(verbs, "claims", _claims, does="judge the paper's claims", writes="claims.json, claims.md")
+    _add(verbs, "report", _report, does="make the page that shows everything", writes="index.html")
+
+
+def _add(verbs: Verbs, name: str, run: object, *, does: str, writes: str, numbered: bool = False) -> None:
+    verb = add_verb(
+        verbs,
+        name,
+        run,  # type: ignore[arg-type]
+        does=does,
+        needs="the study's runs in its results folder; with --partial those that are there",
+        writes=f"{writes} into --output",
+    )
+    if numbered:
+        numbers = [n.partition("_")[2] for n in ARTEFACTS if n.startswith(name)]
+        verb.add_argument("number", choices=numbers, metavar="N", help=f"as in the paper: {', '.join(numbers)}")
+    verb.add_argument("--partial", action="store_true", help="read what is there and mark what is missing")
+    add_study_settings(verb)
+    verb.add_argument("--output", type=Path, metavar="DIR", help="default: where the DAG puts it")
+
+
+def _table(parsed: argparse.Namespace) -> None:
+    from mtcsirl.analysis.rows import evaluation_rows
+    from mtcsirl.storage import write_csv, write_text
+    from mtcsirl.tables import TABLES
+
+    settings = study_settings(parsed)
+    name = f"table_{parsed.number}"
+    rows = evaluation_rows(design(settings, name), settings.results, partial=parsed.partial)
+    table = TABLES[name](rows, settings)
+    folder = parsed.output or Path(settings.results) / "tables"
+    write_csv(folder / f"{name}.csv", table.csv())
+    write_text(folder / f"{name}.md", table.markdown())
+    write_text(folder / f"{name}.tex", table.latex())
+    print(table.markdown())
+
+
+def _figure(parsed: argparse.Namespace) -> None:
+    from mtcsirl.analysis.rows import curve_rows, point_rows, score_rows
+    from mtcsirl.figures import figure_spec
+    from mtcsirl.figures.data import FigureData
+    from mtcsirl.figures.style import figure_bytes
+    from mtcsirl.storage import write_bytes
+
+    settings = study_settings(parsed)
+    name = f"figure_{parsed.number}"
+    study = design(settings, name)
+    readers = {"curves": curve_rows, "scores": score_rows, "points": point_rows}
+    frames = {what: read(study, settings.results, partial=parsed.partial) for what, read in readers.items()}
+    spec = figure_spec(name)
+    data = FigureData(settings=settings, **frames)
+    figure = spec.draw(data)
+    folder = parsed.output or Path(settings.figures)
+    write_bytes(folder / f"{name}.pdf", figure_bytes(figure, "pdf"))
+    write_bytes(folder / f"{name}.png", figure_bytes(figure, "png"))
+    print(f"{spec.title}. {spec.caption(data)}")
+
+
+def _claims(parsed: argparse.Namespace) -> None:
+    raise UserError("claims: not built yet")
+
+
+def _report(parsed: argparse.Namespace) -> None:
+    raise UserError("report: not built yet")
