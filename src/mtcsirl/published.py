@@ -26,8 +26,13 @@ class Published:
         self.seeds: int = data["seeds"]
 
     def target(self, cs_reward: str) -> float:
-        """The cs-reward's target value: 0.8 m/s, |a|_1 = 3."""
-        return float(self.data["targets"].get(cs_reward, np.nan))
+        """The target value of a cs-reward: 0.8 m/s, |a|_1 = 3, and for one of your own what its registry entry says."""
+        if cs_reward in self.data["targets"]:
+            return float(self.data["targets"][cs_reward])
+        from mtcsirl.rewards.ground_truth import COMMON_SENSE_REWARDS
+
+        own = COMMON_SENSE_REWARDS.get(cs_reward)
+        return np.nan if own is None else own.target
 
     def cross_transfer(self, cs_reward: str, source: str, task: str) -> Summary:
         """Tables 1 and 3: metric / target of new agents on ``task`` with the reward learned on ``source``."""

@@ -3,12 +3,13 @@
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
+from zlib import crc32
 
 import numpy as np
 import pandas as pd
 
 from mtcsirl import storage
-from mtcsirl.analysis.rows import KEY, METRICS, OK, POLICIES, ROW_COLUMNS, agents
+from mtcsirl.analysis.rows import KEY, OK, POLICIES, ROW_COLUMNS, agents, metrics
 from mtcsirl.study import Study
 
 Means = Callable[[dict[str, Any]], dict[str, float]]
@@ -18,7 +19,7 @@ Means = Callable[[dict[str, Any]], dict[str, float]]
 def noise(agent: dict[str, Any], metric: str, policy: str) -> float:
     """One number in [-1, 1] for each agent, metric and policy, the same in every process."""
     text = "|".join(str(agent[name]) for name in KEY) + metric + policy
-    return float(np.random.default_rng(list(text.encode())).uniform(-1, 1))
+    return crc32(text.encode()) / 2**31 - 1
 
 
 def evaluation(study: Study, means: Means, spread: float = 0.0) -> pd.DataFrame:
@@ -28,7 +29,7 @@ def evaluation(study: Study, means: Means, spread: float = 0.0) -> pd.DataFrame:
         for agent in agents(run):
             values = {"success": 1.0, "velocity": 0.3, "action_norm": 1.6, "task_reward": 8.0} | means(agent)
             for policy in POLICIES:
-                for metric in METRICS:
+                for metric in metrics(study):
                     value = values[metric] * (1 + spread * noise(agent, metric, policy))
                     own = {"policy": policy, "metric": metric, "value": value, "episodes": 10, "status": OK}
                     rows.append(agent | own | {"folder": f"results/{run.folder}"})
@@ -42,7 +43,7 @@ def write_run(run: Any, results: Path, means: Means, *, episodes: int = 2, passe
         values = {"success": 1.0, "velocity": 0.3, "action_norm": 1.6, "task_reward": 8.0} | means(agent)
         own = {name: agent[name] for name in ("task", "target", "cs_reward", "seed")}
         for policy in POLICIES:
-            for metric in METRICS:
+            for metric in values:
                 centre = values[metric] + 0.01 * noise(agent, metric, policy)
                 shifts = np.linspace(-0.1, 0.1, episodes)
                 rows += [

@@ -13,6 +13,7 @@ import pandas as pd
 
 from mtcsirl import storage
 from mtcsirl.errors import UserError
+from mtcsirl.settings.study import CS_REWARDS
 from mtcsirl.study import Baseline, Expert, IrlRun, Run, Study, Transfer
 
 KEY = ("stage", "experiment", "method", "cs_reward", "source", "task", "target", "seed")
@@ -29,7 +30,6 @@ evaluation. Duplicated: the numbers of another seed, or an episode twice. Foreig
 or seed than its folder. The last three have the value NaN."""
 
 POLICIES = ("stochastic", "deterministic")
-METRICS = ("success", "velocity", "action_norm", "task_reward")
 
 
 def evaluation_rows(study: Study, results: Path | str, *, partial: bool = False) -> pd.DataFrame:
@@ -44,7 +44,7 @@ def evaluation_rows(study: Study, results: Path | str, *, partial: bool = False)
             folder = Path(results) / run.folder
             if not (folder / "evaluation.csv").is_file():
                 _demand(folder / "evaluation.csv", partial)
-            frames.append(_agent_rows(agent, folder))
+            frames.append(_agent_rows(agent, folder, metrics(study)))
     rows = pd.concat(frames, ignore_index=True) if frames else pd.DataFrame({name: [] for name in ROW_COLUMNS})
     return _mark_equal_seeds(rows[list(ROW_COLUMNS)])
 
@@ -129,9 +129,15 @@ def agents(run: Run) -> Iterator[dict[str, Any]]:
         yield key | {"task": run.task, "target": run.target, "seed": run.seed}
 
 
-def _agent_rows(agent: dict[str, Any], folder: Path) -> pd.DataFrame:
+def metrics(study: Study) -> tuple[str, ...]:
+    """What an evaluation measures: the paper's two cs-rewards, further ones of this study, success, task reward."""
+    used = dict.fromkeys((*CS_REWARDS, *(x.cs_reward for x in study.experts), *(x.cs_reward for x in study.irl_runs)))
+    return ("success", *used, "task_reward")
+
+
+def _agent_rows(agent: dict[str, Any], folder: Path, names: tuple[str, ...]) -> pd.DataFrame:
     """One row per policy and metric of one agent."""
-    grid = pd.MultiIndex.from_product([POLICIES, METRICS], names=["policy", "metric"])
+    grid = pd.MultiIndex.from_product([POLICIES, names], names=["policy", "metric"])
     rows = pd.DataFrame({"value": np.nan, "episodes": 0}, index=grid)
     status = MISSING
     path = folder / "evaluation.csv"

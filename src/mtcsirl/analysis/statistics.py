@@ -26,7 +26,7 @@ class Interval(NamedTuple):
 
     def contains(self, value: float) -> bool:
         """Whether ``value`` lies inside, bounds included; False for an interval of NaN."""
-        return self.low <= value <= self.high
+        return bool(self.low <= value <= self.high)
 
 
 class Summary(NamedTuple):
@@ -72,7 +72,7 @@ def t_interval(summary: Summary, confidence: float = 0.95) -> Interval:
     """Interval m +- t((1 + confidence) / 2, n - 1) s / sqrt(n) of the mean."""
     if summary.n < 2:
         return UNKNOWN
-    half = _t(confidence, summary.n - 1) * summary.std / np.sqrt(summary.n)
+    half = float(_t(confidence, summary.n - 1) * summary.std / np.sqrt(summary.n))
     return Interval(summary.mean - half, summary.mean + half)
 
 
@@ -83,7 +83,7 @@ def prediction_interval(original: Summary, runs: int, confidence: float = 0.95) 
     """
     if original.n < 2 or runs < 1:
         return UNKNOWN
-    half = _t(confidence, original.n - 1) * original.std * np.sqrt(1 / original.n + 1 / runs)
+    half = float(_t(confidence, original.n - 1) * original.std * np.sqrt(1 / original.n + 1 / runs))
     return Interval(original.mean - half, original.mean + half)
 
 
@@ -96,7 +96,7 @@ def welch(first: Summary, second: Summary, confidence: float = 0.95) -> Welch:
     if first.n < 2 or second.n < 2:
         return Welch(difference, np.nan, np.nan, np.nan, np.nan, np.nan)
     a, b = first.std**2 / first.n, second.std**2 / second.n
-    error = np.sqrt(a + b)
+    error = float(np.sqrt(a + b))
     if error == 0:
         p = 1.0 if difference == 0 else 0.0
         return Welch(difference, difference, difference, np.nan, np.nan, p)
@@ -126,14 +126,14 @@ def hedges_g(first: Summary, second: Summary, confidence: float = 0.95) -> Estim
     degrees = first.n + second.n - 2
     if first.n < 2 or second.n < 2:
         return Estimate(np.nan, np.nan, np.nan, first.n + second.n)
-    pooled = np.sqrt(((first.n - 1) * first.std**2 + (second.n - 1) * second.std**2) / degrees)
+    pooled = float(np.sqrt(((first.n - 1) * first.std**2 + (second.n - 1) * second.std**2) / degrees))
     difference = first.mean - second.mean
     if pooled == 0:
         g = 0.0 if difference == 0 else float(np.copysign(np.inf, difference))
         return Estimate(g, np.nan, np.nan, first.n + second.n)
     correction = 1 - 3 / (4 * degrees - 1)
     d = difference / pooled
-    root = np.sqrt(first.n * second.n / (first.n + second.n))
+    root = float(np.sqrt(first.n * second.n / (first.n + second.n)))
     low, high = _noncentrality(d * root, degrees, confidence)
     return Estimate(float(correction * d), correction * low / root, correction * high / root, first.n + second.n)
 

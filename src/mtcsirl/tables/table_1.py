@@ -1,0 +1,13 @@
+"""Table 1 (tab:mtl_action_norm): action_norm ratio of agents across tasks, rewards of several targets of one task."""
+
+import pandas as pd
+
+from mtcsirl.published import Published, load_published
+from mtcsirl.settings import Settings
+from mtcsirl.tables.cross_transfer import cross_transfer_table
+from mtcsirl.tables.table import Table
+
+
+def table_1(rows: pd.DataFrame, settings: Settings, published: Published | None = None) -> Table:
+    """Build the table from ``evaluation_rows``."""
+    return cross_transfer_table("table_1", "action_norm", rows, settings, published or load_published())

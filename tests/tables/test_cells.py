@@ -1,0 +1,73 @@
+import numpy as np
+import pandas as pd
+import pytest
+
+from mtcsirl.analysis.statistics import Summary
+from mtcsirl.tables.cells import make_cell
+
+UNKNOWN = Summary(np.nan, np.nan, 0)
+
+
+def rows(values, status="ok", tasks=("push-back",), metric="velocity"):
+    """``values`` [seeds][tasks]; the deterministic policy is 0.1 slower."""
+    table = []
+    for seed, row in enumerate(values):
+        for task, value in zip(tasks, row, strict=True):
+            state = status if isinstance(status, str) else status[seed]
+            for policy, shift in (("stochastic", 0.0), ("deterministic", -0.1)):
+                table.append({"seed": seed, "task": task, "policy": policy, "metric": metric,
+                              "value": value + shift, "status": state})  # fmt: skip
+    return pd.DataFrame(table)
+
+
+def test_seeds_are_averaged_after_tasks():
+    """Std is that of the per-seed means (0.5, 0.6, 0.7), not of the six values."""
+    cell = make_cell(rows([[0.4, 0.6], [0.5, 0.7], [0.6, 0.8]], tasks=("a", "b")), "velocity", UNKNOWN)
+    assert cell.ours == pytest.approx((0.6, 0.1, 3))
+    assert cell.interval == pytest.approx((0.6 - 0.24841, 0.6 + 0.24841), abs=1e-4)
+    assert cell.deterministic == pytest.approx(0.5)
+
+
+def test_inside_and_outside_the_papers_prediction_interval():
+    paper = Summary(0.73, 0.07, 5)  # five new seeds: 0.61 to 0.85
+    near, far = ([[m + d] for d in (-0.02, -0.01, 0, 0.01, 0.02)] for m in (0.64, 0.58))
+    assert make_cell(rows(near), "velocity", paper).inside is True
+    assert make_cell(rows(far), "velocity", paper).inside is False
+    assert make_cell(rows(near), "velocity", Summary(0.73, np.nan, 5)).inside is None
+    lines = make_cell(rows(far), "velocity", paper).lines()
+    assert lines == ("0.58±0.02, n=5", "[0.56, 0.60]", "0.73±0.07, outside [0.61, 0.85]")
+
+
+def test_ratio_divides_by_the_target():
+    cell = make_cell(rows([[0.72], [0.76]]), "velocity", Summary(0.93, np.nan, 5), scale=0.8)
+    assert cell.ours.mean == pytest.approx(0.925)
+    assert cell.lines()[2] == "0.93"
+
+
+def test_percent_is_printed_as_percent():
+    cell = make_cell(rows([[1.0], [0.9]], metric="success"), "success", Summary(0.635, 0.012, 5))
+    assert cell.lines(1, 100.0)[0] == "95.0±7.1, n=2"
+    assert cell.lines(1, 100.0)[2].startswith("63.5±1.2, outside [")
+
+
+def test_missing_doubtful_and_gated_agents_are_marked():
+    status = ["ok", "missing", "duplicated", "below gate", "foreign"]
+    values = [[0.7], [np.nan], [np.nan], [0.3], [np.nan]]
+    cell = make_cell(rows(values, status), "velocity", UNKNOWN)
+    assert (cell.ours.n, cell.expected) == (2, 5)
+    assert cell.ours.mean == pytest.approx(0.5), "an agent below its gate counts"
+    assert cell.marks == {"below": 1, "missing": 1, "doubtful": 2}
+    assert cell.lines()[0] == "0.50±0.28, n=2 †1 ‡1 §2"
+
+
+def test_a_seed_without_one_of_its_tasks_has_no_mean():
+    values = [[0.7, 0.9], [0.7, np.nan]]
+    cell = make_cell(rows(values, tasks=("a", "b")), "velocity", UNKNOWN)
+    assert cell.ours.n == 1
+    assert cell.ours.mean == pytest.approx(0.8)
+
+
+def test_nothing_there_is_a_dash_with_its_count():
+    cell = make_cell(rows([[np.nan]] * 5, "missing"), "velocity", Summary(0.73, 0.07, 5))
+    assert cell.lines() == ("– ‡5", "–", "0.73±0.07")
+    assert cell.inside is None

@@ -1,0 +1,144 @@
+import shutil
+import subprocess
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from mtcsirl.analysis.rows import select
+from mtcsirl.design import design
+from mtcsirl.settings import Settings
+from mtcsirl.tables import TABLES
+from mtcsirl.tables.table import Column, Line, Table
+from tests.analysis.made_up import evaluation
+
+SETTINGS = Settings()
+RESULT_TABLES = ("table_1", "table_2", "table_3", "table_4")
+
+
+def means(agent):
+    """Experts and MT-CSIRL reach their targets; MT-AIRL fails; diagonal 0.72 m/s, off it 0.4 m/s."""
+    if agent["stage"] == "train_expert" or agent["method"].startswith("mt_csirl"):
+        near = agent["experiment"] != "multi_target" or agent["source"] == agent["task"]
+        return {"velocity": 0.72 if near else 0.4, "action_norm": 2.7 if near else 1.8}
+    if agent["method"].startswith("mt_"):
+        return {"velocity": 0.1, "action_norm": 1.3, "success": 0.6}
+    return {"velocity": 0.32, "action_norm": 1.57}
+
+
+@pytest.fixture(scope="module")
+def rows():
+    return {name: evaluation(design(SETTINGS, name), means, spread=0.05) for name in RESULT_TABLES}
+
+
+@pytest.fixture(scope="module")
+def tables(rows):
+    return {name: build(rows.get(name), SETTINGS) for name, build in TABLES.items()}
+
+
+@pytest.mark.parametrize("name", RESULT_TABLES)
+def test_every_cell_has_our_number_and_the_papers(tables, name):
+    numbers = tables[name].csv()
+    expected = {"table_1": 30, "table_3": 30, "table_2": 28, "table_4": 24}[name]
+    assert len(numbers) == expected
+    assert numbers["n"].eq(5).all()
+    assert numbers[["mean", "std", "low", "high", "paper_mean"]].notna().all(axis=None)
+    assert (numbers["low"] < numbers["mean"]).sum() >= numbers["std"].gt(0).sum()
+
+
+def test_table_1_and_3_have_diagonal_bold_and_the_baseline_last(tables):
+    for name, cs_target, near, far in (("table_1", 3.0, 2.7, 1.8), ("table_3", 0.8, 0.72, 0.4)):
+        numbers = tables[name].csv().set_index(["row", "column"])["mean"]
+        assert numbers["reach-wall", "reach-wall"] == pytest.approx(near / cs_target, rel=0.05)
+        assert numbers["reach-wall", "push-back"] == pytest.approx(far / cs_target, rel=0.05)
+        assert tables[name].lines[3].strong == (1,)
+        assert tables[name].lines[-3].label == "SAC (task reward alone)"
+        assert set(tables[name].csv()["inside"]) == {""}, "the paper prints no spread"
+
+
+def test_table_2_says_who_falls_inside_the_papers_interval(tables):
+    numbers = tables["table_2"].csv().set_index(["row", "column"])
+    assert numbers.loc[("MT-CSIRL", "velocity: average velocity"), "inside"] == "true"
+    assert numbers.loc[("MT-VAIRL", "velocity: average velocity"), "inside"] == "false"
+    airl = numbers.loc[("MT-AIRL", "action norm: success rate (%)")]
+    assert airl["mean"] == pytest.approx(0.6, abs=0.03)
+    assert airl["paper_mean"] == pytest.approx(0.635)
+
+
+def test_table_4_reads_agents_with_a_learned_task_reward(rows, tables):
+    numbers = tables["table_4"].csv().set_index(["row", "column"])["mean"]
+    assert numbers["door-close", "action norm: action norm ratio"] == pytest.approx(0.9, abs=0.05)
+    assert set(select(rows["table_4"], stage="transfer")["target"]) == {SETTINGS.multi_task.train_targets[0]}
+
+
+def test_table_5_names_what_differs(tables):
+    numbers = tables["table_5"].csv().set_index("row")
+    assert numbers.loc["Discount factor", "same"] == "yes"
+    assert numbers.loc["Batch size (transitions per gradient step)", ["ours", "paper", "same"]].tolist() == [
+        "128",
+        "500",
+        "no",
+    ]
+    assert numbers.loc["Policy hidden sizes", "paper"] == "(256, 256)"
+
+
+@pytest.mark.parametrize("name", TABLES)
+def test_scale_and_deviations_stand_under_every_table(tables, name):
+    notes = tables[name].notes
+    assert notes[0].startswith("scale desk; 5 seeds")
+    assert any("sac.minibatch = 128" in note and "500" in note for note in notes)
+    assert "sac.minibatch" in tables[name].markdown()
+
+
+@pytest.mark.parametrize("name", TABLES)
+def test_smoke_tables_say_that_they_mean_nothing(rows, name):
+    table = TABLES[name](rows.get(name), SETTINGS.model_copy(update={"scale": "smoke"}))
+    assert "smoke scale: numbers mean nothing" in table.markdown()
+    assert "smoke scale: numbers mean nothing" in table.latex()
+    assert set(table.csv()["scale"]) == {"smoke"}
+
+
+def test_missing_cells_are_marked_and_explained(rows):
+    holes = rows["table_2"].copy()
+    gone = (holes["method"] == "mt_csirl") & (holes["seed"] >= 3) & (holes["task"] == "push-back")
+    holes.loc[gone, ["value", "status"]] = [np.nan, "missing"]
+    table = TABLES["table_2"](holes, SETTINGS)
+    text = table.markdown()
+    row = next(line for line in text.splitlines() if line.startswith("| MT-CSIRL |"))
+    assert row.count("n=3 ‡2") == 4
+    assert "‡ missing agents" in text
+
+
+def test_own_method_gets_its_row(rows):
+    """A method of one's own appears under its name, without a number of the paper's."""
+    own = rows["table_2"].copy()
+    own.loc[own["method"] == "mt_vairl", "method"] = "my_gail"
+    settings = SETTINGS.model_copy(update={"methods": ("my_gail",)})
+    numbers = TABLES["table_2"](own, settings).csv().set_index("row")
+    assert numbers.loc["MY-GAIL", "paper_mean"].isna().all()
+    assert numbers.loc["MY-GAIL", "mean"].notna().all()
+
+
+def test_markdown_is_a_table(tables):
+    lines = [line for line in tables["table_2"].markdown().splitlines() if line.startswith("|")]
+    assert {line.count("|") for line in lines} == {6}
+    assert len(lines) == 2 + 3 * 7
+
+
+def test_special_characters_survive_both_forms():
+    frame = pd.DataFrame([{"row": "a"}])
+    table = Table("table_9", "50 % of x_y", "a & b", (Column("c_d"),), (Line("e|f", ("1±2 †3",)),), frame, ("#1",))
+    assert r"50 \% of x\_y" in table.latex()
+    assert r"1$\pm$2 $^{\dagger}$3" in table.latex()
+    assert r"e\|f" in table.markdown()
+
+
+@pytest.mark.skipif(shutil.which("pdflatex") is None, reason="pdflatex is not installed")
+def test_latex_compiles_with_booktabs(tables, tmp_path):
+    head = "\\documentclass{article}\n\\usepackage{booktabs,graphicx}\n\\begin{document}\n"
+    body = "\\clearpage\n".join(table.latex() for table in tables.values())
+    (tmp_path / "tables.tex").write_text(head + body + "\\end{document}\n")
+    command = ["pdflatex", "-interaction=nonstopmode", "-halt-on-error", "tables.tex"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout[-2000:]
+    assert (tmp_path / "tables.pdf").stat().st_size > 10_000
