@@ -162,3 +162,13 @@ def locked(folder: Path | str) -> Iterator[Path]:
             raise UserError(f"{folder}: another process writes here; wait for it or stop it") from error
         yield folder
     (folder / ".lock").unlink(missing_ok=True)
+
+
+def is_locked(folder: Path | str) -> bool:
+    """Whether a process holds ``folder``; looks at the kernel's list, so that asking never gets in a job's way."""
+    lock, held = Path(folder) / ".lock", Path("/proc/locks")
+    try:
+        inode = lock.stat().st_ino
+        return any(line.split()[5].endswith(f":{inode}") for line in held.read_text().splitlines())
+    except FileNotFoundError:
+        return lock.exists()

@@ -2,11 +2,17 @@
 
 import argparse
 import json
+from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from mtcsirl.commands.arguments import Verbs, add_study_settings, add_verb, study_settings
-from mtcsirl.design import ARTEFACTS
+from mtcsirl.design import ARTEFACTS, design
 from mtcsirl.errors import UserError
+
+if TYPE_CHECKING:
+    from mtcsirl.plan import Rates
+    from mtcsirl.settings import Settings
 
 
 def register(verbs: Verbs) -> None:
@@ -20,6 +26,7 @@ def register(verbs: Verbs) -> None:
         writes="nothing",
     )
     plan.add_argument("--target", type=_artefact, metavar="NAME", help="one artefact, for example figure_3")
+    plan.add_argument("--rates", type=Path, default=None, metavar="FILE", help="what calibrate wrote; default: shipped")
     plan.add_argument("--cores", type=int, default=2, metavar="N", help="cores to spread the jobs over; default 2")
     add_study_settings(plan)
 
@@ -74,11 +81,66 @@ def _artefact(name: str) -> str:
 
 
 def _plan(parsed: argparse.Namespace) -> None:
-    raise UserError("plan: not built yet")
+    from mtcsirl.plan import CALIBRATION, load_rates, plan, wall_hours
+
+    settings, rates = study_settings(parsed), load_rates(parsed.rates or CALIBRATION)
+    stages = plan(design(settings, parsed.target), settings, rates)
+    lines = [
+        (s.stage, s.jobs, f"{s.core_hours:.1f}", f"{s.longest_minutes:.1f}", f"{s.memory_mib:.0f}", f"{s.disk_gib:.2f}")
+        for s in stages
+    ]
+    total = (sum(s.jobs for s in stages), sum(s.core_hours for s in stages), sum(s.disk_gib for s in stages))
+    lines.append(("total", total[0], f"{total[1]:.1f}", "", "", f"{total[2]:.2f}"))
+    _print_table(("stage", "jobs", "core-hours", "longest job, min", "memory, MiB", "disk, GiB"), lines)
+    print(f"\nscale {settings.scale}: {wall_hours(stages, parsed.cores):.1f} hours on {parsed.cores} cores")
+    print(f"rates measured on: {rates.machine}")
+    if parsed.target is None:
+        _print_artefacts(settings, rates)
+
+
+def _print_artefacts(settings: "Settings", rates: "Rates") -> None:
+    """Jobs and core-hours of every artefact asked for alone; artefacts share runs, so these add up to more."""
+    from mtcsirl.plan import plan
+
+    lines = []
+    for name in ARTEFACTS:
+        stages = plan(design(settings, name), settings, rates)
+        lines.append((name, sum(s.jobs for s in stages), f"{sum(s.core_hours for s in stages):.1f}"))
+    print("\neach artefact alone (they share runs):")
+    _print_table(("artefact", "jobs", "core-hours"), lines)
 
 
 def _status(parsed: argparse.Namespace) -> None:
-    raise UserError("status: not built yet")
+    from mtcsirl.plan import load_rates
+    from mtcsirl.status import FAILED, RUNNING, STATES, seconds_left, study_status
+
+    settings = study_settings(parsed)
+    statuses = study_status(design(settings, parsed.target), settings)
+    lines = []
+    for stage in dict.fromkeys(status.run.stage for status in statuses):
+        own = [status for status in statuses if status.run.stage == stage]
+        gates = [status.passed for status in own if status.passed is not None]
+        counts = [sum(status.state == state for status in own) for state in STATES]
+        lines.append((stage, *counts, f"{sum(gates)} of {len(gates)}" if gates else ""))
+    _print_table(("stage", *STATES, "gates passed"), lines)
+    for state in (RUNNING, FAILED):
+        for status in statuses:
+            if status.state == state:
+                print(f"{state}: {status.run.folder}: {status.says}")
+    left = seconds_left(statuses, settings, load_rates(), parsed.cores)
+    print(f"\ntime left on {parsed.cores} cores: about {left / 3600:.1f} hours" if left else "\nall runs are done")
+
+
+def _print_table(head: tuple[str, ...], rows: Sequence[tuple[object, ...]]) -> None:
+    """Columns aligned: the first to the left, numbers to the right."""
+    texts = [tuple(map(str, row)) for row in (head, *rows)]
+    widths = [max(len(row[i]) for row in texts) for i in range(len(head))]
+    for row in texts:
+        first, rest = (
+            row[0].ljust(widths[0]),
+            [text.rjust(width) for text, width in zip(row[1:], widths[1:], strict=True)],
+        )
+        print("  ".join((first, *rest)).rstrip())
 
 
 def _deviations(parsed: argparse.Namespace) -> None:
