@@ -49,10 +49,10 @@ def test_same_parameters_after_100_updates(temperature):
 
     for step in range(UPDATES):
         # Seeding both random streams before each update makes the reference's rows and noise known.
-        np.random.seed(step)
+        np.random.seed(step)  # noqa: NPY002
         torch.manual_seed(step)
         model.train(1, MINIBATCH)
-        np.random.seed(step)
+        np.random.seed(step)  # noqa: NPY002
         rows = buffer.sample(MINIBATCH)
         torch.manual_seed(step)
         shape = (MINIBATCH, ACTION)

@@ -30,9 +30,7 @@ class SquashedSample(NamedTuple):
     """1 where log_std lies inside its bounds and so has a gradient, else 0."""
 
 
-def squashed_sample(
-    head: Tensor, noise: Tensor, min_log_std: float, max_log_std: float
-) -> SquashedSample:
+def squashed_sample(head: Tensor, noise: Tensor, min_log_std: float, max_log_std: float) -> SquashedSample:
     """Draw a = tanh(mu + sigma x noise) from the network's output head = (mu, log_std), [..., 2 x action].
 
     log pi(a|s) = sum_i [ -noise_i^2 / 2 - log_std_i - log(2 pi) / 2 - log(1 - a_i^2 + 1e-6) ].
@@ -47,9 +45,7 @@ def squashed_sample(
     return SquashedSample(action, log_prob, deviation, slope, (log_std == raw_log_std).to(head.dtype))
 
 
-def squashed_sample_gradient(
-    sample: SquashedSample, action_gradient: Tensor, log_prob_gradient: Tensor
-) -> Tensor:
+def squashed_sample_gradient(sample: SquashedSample, action_gradient: Tensor, log_prob_gradient: Tensor) -> Tensor:
     """dL/d head [..., 2 x action], given dL/d action [..., action] and dL/d log_prob [..., 1].
 
     dL/du = (dL/da + dL/dlogp x 2 a / (1 - a^2 + 1e-6)) (1 - a^2);

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from itertools import pairwise
 
 import torch
 from torch import Tensor
@@ -40,7 +41,7 @@ class NetworkStack:
         dtype: torch.dtype = torch.float32,
     ) -> None:
         self.sizes = tuple(sizes)
-        count = sum((fan_in + 1) * fan_out for fan_in, fan_out in zip(sizes, sizes[1:], strict=False))
+        count = sum((fan_in + 1) * fan_out for fan_in, fan_out in pairwise(sizes))
         self.parameters = torch.zeros(networks, count, device=device, dtype=dtype)
         self.gradient = torch.zeros_like(self.parameters)
         self.weights, self.biases = self._views(self.parameters)
@@ -48,7 +49,7 @@ class NetworkStack:
 
     def _views(self, flat: Tensor) -> tuple[list[Tensor], list[Tensor]]:
         weights, biases, start = [], [], 0
-        for fan_in, fan_out in zip(self.sizes, self.sizes[1:], strict=False):
+        for fan_in, fan_out in pairwise(self.sizes):
             end = start + fan_in * fan_out
             weights.append(flat[:, start:end].view(-1, fan_out, fan_in))
             biases.append(flat[:, end : end + fan_out].view(-1, 1, fan_out))

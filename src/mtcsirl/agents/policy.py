@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -43,6 +44,20 @@ class Policy:
         mean, log_std = np.split(hidden @ weight + bias, 2, axis=-1)
         return mean, np.clip(log_std, self.min_log_std, self.max_log_std)
 
+    def tensors(self) -> dict[str, Tensor]:
+        """Weights and biases by name."""
+        weights = {f"weight_{layer}": tensor for layer, tensor in enumerate(self.weights)}
+        return weights | {f"bias_{layer}": tensor for layer, tensor in enumerate(self.biases)}
+
+    def with_tensors(self, tensors: dict[str, Tensor]) -> Policy:
+        """A policy of the same kind with the weights that `tensors` gave."""
+        layers = range(len(self.weights))
+        return replace(
+            self,
+            weights=tuple(tensors[f"weight_{layer}"] for layer in layers),
+            biases=tuple(tensors[f"bias_{layer}"] for layer in layers),
+        )
+
     def act(self, observation: np.ndarray, generator: np.random.Generator | None = None) -> np.ndarray:
         """Actions [..., 4] for observations [..., 39]: a sample drawn from `generator`, without one the mode."""
         mean, log_std = self.head(observation)
@@ -54,9 +69,7 @@ class Policy:
 def save_policy(policy: Policy, folder: Path | str, name: str = "policy") -> None:
     """Write `<name>.safetensors` (weights) and `<name>.json` (shapes, bounds, observation) into `folder`."""
     folder = Path(folder)
-    tensors = {f"weight_{layer}": tensor for layer, tensor in enumerate(policy.weights)}
-    tensors |= {f"bias_{layer}": tensor for layer, tensor in enumerate(policy.biases)}
-    storage.write_tensors(folder / f"{name}.safetensors", tensors)
+    storage.write_tensors(folder / f"{name}.safetensors", policy.tensors())
     storage.write_json(
         folder / f"{name}.json",
         {
@@ -79,7 +92,8 @@ def load_policy(folder: Path | str, name: str = "policy") -> Policy:
     if not isinstance(description, dict) or description.get("format") != FORMAT:
         raise UserError(f"{description_file}: not a policy description; expected format {FORMAT!r}")
     sizes = description["sizes"]
-    expected = {f"weight_{layer}": shape for layer, shape in enumerate(zip(sizes[1:], sizes, strict=False))}
+    shapes = [(fan_out, fan_in) for fan_in, fan_out in pairwise(sizes)]
+    expected: dict[str, tuple[int, ...]] = {f"weight_{layer}": shape for layer, shape in enumerate(shapes)}
     expected |= {f"bias_{layer}": (size,) for layer, size in enumerate(sizes[1:])}
     found = {key: tuple(tensor.shape) for key, tensor in tensors.items()}
     if found != expected or any(tensor.dtype != torch.float32 for tensor in tensors.values()):

@@ -10,7 +10,7 @@ Source: Haarnoja et al., Soft Actor-Critic Algorithms and Applications, arXiv:18
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import torch
@@ -56,7 +56,7 @@ class FusedSac:
             raise ValueError(f"{agents} agents need as many seeds, not {len(seeds)}")
         self.agents, self.settings, self.action_size = agents, settings, action_size
         self.device = torch.device(settings.device if device is None else device)
-        self._like = {"device": self.device, "dtype": dtype}
+        self._like: dict[str, Any] = {"device": self.device, "dtype": dtype}
         self._log_std_bounds = (settings.min_log_std, settings.max_log_std)
         automatic_entropy = settings.target_entropy == "automatic"
         self._target_entropy = float(-action_size if automatic_entropy else settings.target_entropy)
@@ -152,17 +152,13 @@ class FusedSac:
         temperature = self.log_temperature.exp()
         entropy = -sample.log_prob.mean(1)
         self._step_temperature(entropy)
-        critic_loss = self._step_critics(
-            observation, action, reward, next_observation, noise[1], temperature
-        )
+        critic_loss = self._step_critics(observation, action, reward, next_observation, noise[1], temperature)
         actor_loss = self._step_actor(observation, sample, temperature)
         self.target_critics.parameters.lerp_(self.critics.parameters, self.settings.polyak)
 
         actor_norm = self.actor.gradient.norm(dim=1)
         critic_norm = self.critics.gradient.norm(dim=1).view(2, -1).norm(dim=0)
-        self._metric_sums += torch.stack(
-            (actor_loss, critic_loss, temperature, entropy, actor_norm, critic_norm)
-        )
+        self._metric_sums += torch.stack((actor_loss, critic_loss, temperature, entropy, actor_norm, critic_norm))
 
     def _step_temperature(self, entropy: Tensor) -> None:
         """Loss -log(alpha) x mean(log pi + target entropy), whose gradient in log(alpha) is the entropy gap."""

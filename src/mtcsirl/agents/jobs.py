@@ -1,0 +1,98 @@
+"""What is to be trained, and what a finished run leaves behind."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+import pandas as pd
+
+from mtcsirl import storage
+from mtcsirl.agents.policy import Policy, save_policy
+from mtcsirl.agents.relabelling import RewardMixture
+from mtcsirl.errors import UserError
+from mtcsirl.evaluation import COLUMNS, Row, relative_distance
+from mtcsirl.settings.runs import AgentRunSettings
+from mtcsirl.transitions import RewardFunction
+
+
+@dataclass(frozen=True)
+class AgentJob:
+    """One agent to train: where, on what, with which seed.
+
+    f is the cs-reward (ground truth for an expert, learned for a transfer agent; it sees transitions as the agent
+    does), weighted by the settings' cs_weight and curriculum. `task_reward` replaces the environment's reward.
+    `cs_reward` names the behaviour in the rows and in the gate. `keep` says which policy the run leaves: the best
+    by the gate over trials during training, or the last.
+    """
+
+    task: str
+    target: int
+    seed: int
+    settings: AgentRunSettings
+    cs_reward: str = ""
+    f: RewardFunction | None = None
+    task_reward: RewardFunction | None = None
+    gate: Literal["expert", "sac"] = "sac"
+    keep: Literal["best", "last"] = "best"
+
+    def mixture(self) -> RewardMixture:
+        """The reward that this agent's policy is trained on."""
+        settings = self.settings
+        scale = settings.sac.reward_scale
+        return RewardMixture(scale, settings.cs_weight, settings.curriculum, self.f, self.task_reward)
+
+    def fingerprint(self) -> str:
+        """Differs between jobs whose results may differ, rewards excepted: a checkpoint of another is not resumed."""
+        key = (self.task, self.target, self.seed, self.cs_reward, self.gate, self.keep)
+        return hashlib.sha256(repr((key, self.settings.model_dump_json())).encode()).hexdigest()
+
+
+@dataclass(frozen=True)
+class TrainedAgent:
+    """What a finished run leaves behind."""
+
+    job: AgentJob
+    policy: Policy
+    curve: pd.DataFrame
+    evaluation: list[Row]
+    gate: dict[str, Any]
+
+    def save(self, folder: Path | str) -> None:
+        """Write policy.safetensors, policy.json, curve.csv, evaluation.csv and gate.json."""
+        folder = Path(folder)
+        save_policy(self.policy, folder)
+        storage.write_csv(folder / "curve.csv", self.curve)
+        storage.write_csv(folder / "evaluation.csv", pd.DataFrame(self.evaluation, columns=list(COLUMNS)))
+        storage.write_json(folder / "gate.json", self.gate)
+
+
+def shared_settings(jobs: Sequence[AgentJob]) -> AgentRunSettings:
+    """The settings of agents that train in lockstep.
+
+    Raises UserError when they differ in more than reward scale, cs_weight or curriculum.
+    """
+    own: dict[str, Any] = {"cs_weight": 0.0, "curriculum": False}
+
+    def common(settings: AgentRunSettings) -> AgentRunSettings:
+        sac = settings.sac.model_copy(update={"reward_scale": 1.0})
+        return settings.model_copy(update={**own, "sac": sac})
+
+    first = common(jobs[0].settings)
+    for job in jobs:
+        if common(job.settings) != first:
+            raise UserError(
+                f"{job.task}-t{job.target} s{job.seed}: agents in lockstep share all settings but reward_scale, "
+                "cs_weight and curriculum; train it on its own"
+            )
+    return jobs[0].settings
+
+
+def gate_score(job: AgentJob, means: dict[str, float]) -> tuple[float, float]:
+    """How good a policy looks to its gate: success first, then nearness to the target or, for plain SAC, reward."""
+    if job.gate == "expert":
+        return means["success"], -relative_distance(means[job.cs_reward], job.cs_reward)
+    return means["success"], means["task_reward"]
