@@ -20,7 +20,10 @@ MISSING_OSMESA = (
 
 
 class CameraPose(NamedTuple):
-    """A pinhole camera: ``position`` [3] in metres, ``axes`` [3, 3] with columns right, up and backward, ``fovy`` degrees."""
+    """A pinhole camera.
+
+    ``position`` [3] in metres, ``axes`` [3, 3] with the columns right, up and backward, ``fovy`` in degrees.
+    """
 
     position: NDArray[np.float64]
     axes: NDArray[np.float64]

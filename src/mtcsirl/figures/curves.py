@@ -1,0 +1,135 @@
+"""Learning curves over environment steps: mean and t-interval over seeds, one series per method."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from mtcsirl.analysis.statistics import summarise, t_interval
+from mtcsirl.figures.style import TARGET_COLOUR, Look, empty_panel, quantity_label
+
+BINS = 40
+
+
+@dataclass(frozen=True)
+class Series:
+    """One line of a panel.
+
+    ``rows`` are tidy curve rows (task, seed, step, value) of one metric; ``expected`` the (task, seed) pairs that the
+    study asks for; ``label`` the name in the legend.
+    """
+
+    label: str
+    look: Look
+    rows: pd.DataFrame
+    expected: tuple[tuple[str, int], ...]
+
+    @property
+    def missing(self) -> list[tuple[str, int]]:
+        """The (task, seed) pairs that the study asks for and that are not there."""
+        found = set(zip(self.rows["task"], self.rows["seed"].astype(int), strict=True))
+        return [pair for pair in self.expected if pair not in found]
+
+
+def summarise_curve(rows: pd.DataFrame, bins: int = BINS) -> pd.DataFrame:
+    """Mean over seeds with its 95 % t-interval: columns step, mean, low, high, n.
+
+    A seed's value in a bin of steps is the mean over its tasks of the mean of the bin's rows, so each task counts
+    once. Curves end where the shortest run ends, so that every point is a mean over the same runs. With one seed
+    low and high are NaN.
+    """
+    if rows.empty:
+        return pd.DataFrame(columns=["step", "mean", "low", "high", "n"])
+    end = rows.groupby(["task", "seed"])["step"].max().min()
+    rows = rows[rows["step"] <= end]
+    edges = np.linspace(rows["step"].min() - 1, end, min(bins, rows["step"].nunique()) + 1)
+    binned = rows.assign(bin=np.searchsorted(edges, rows["step"], side="left"))
+    per_run = binned.groupby(["bin", "seed", "task"])[["step", "value"]].mean()
+    per_seed = per_run.groupby(["bin", "seed"]).mean()
+    summaries = [summarise(row) for row in per_seed["value"].unstack("seed").to_numpy()]
+    intervals = np.array([t_interval(summary) for summary in summaries])
+    return pd.DataFrame(
+        {
+            "step": per_seed["step"].groupby("bin").mean().to_numpy(),
+            "mean": [summary.mean for summary in summaries],
+            "low": intervals[:, 0],
+            "high": intervals[:, 1],
+            "n": [summary.n for summary in summaries],
+        }
+    )
+
+
+def draw_curves(axes: Axes, series: Sequence[Series], metric: str, target: float | None) -> None:
+    """Draw each series with its interval and the target as a red line.
+
+    The value axis follows means and target, not the intervals: with few seeds a t-interval can be many times the axis;
+    it is then cut off at the frame.
+    """
+    heights = [target] if target is not None else []
+    for one in series:
+        curve = summarise_curve(one.rows)
+        if curve.empty:
+            continue
+        axes.fill_between(curve["step"], curve["low"], curve["high"], color=one.look.colour, alpha=0.18, linewidth=0)
+        axes.plot(
+            curve["step"],
+            curve["mean"],
+            color=one.look.colour,
+            linestyle=one.look.linestyle,
+            marker=one.look.marker,
+            markevery=max(1, len(curve) // 6),
+            label=one.label,
+        )
+        heights.append(curve["mean"].max())
+    if target is not None:
+        axes.axhline(target, color=TARGET_COLOUR, linewidth=1)
+        axes.annotate(
+            f"target {target:g}", (1, target), xycoords=("axes fraction", "data"), xytext=(0, 2),
+            textcoords="offset points", ha="right", va="bottom", color=TARGET_COLOUR, fontsize=6.5,
+        )  # fmt: skip
+    if all(one.rows.empty for one in series):
+        empty_panel(axes, "no runs yet")
+    axes.set_ylim(0, 1.2 * max(heights, default=1.0))
+    axes.set_xlim(left=0)
+    axes.set_xlabel("environment steps")
+    axes.set_ylabel(quantity_label(metric))
+    axes.xaxis.set_major_formatter(lambda step, _: f"{step / 1000:g}k" if step else "0")
+    axes.locator_params(axis="x", nbins=4)
+
+
+def add_legend(figure: Figure, axes: list[Axes]) -> None:
+    """One legend above all panels, each method once."""
+    entries = {label: line for panel in axes for line, label in zip(*panel.get_legend_handles_labels(), strict=True)}
+    if entries:
+        figure.legend(entries.values(), entries.keys(), loc="outside upper center", ncols=len(entries))
+
+
+def missing_note(series: Sequence[Series]) -> list[str]:
+    """One line that names the runs that are not there yet; nothing if all are."""
+    parts = []
+    for one in series:
+        if one.missing and len(one.missing) == len(one.expected):
+            parts.append(f"{one.label}: all runs")
+        elif one.missing:
+            parts.append(f"{one.label}: {_pairs(one.missing)}")
+    return [f"not there yet – {'; '.join(parts)}"] if parts else []
+
+
+def _pairs(missing: Sequence[tuple[str, int]]) -> str:
+    names = [f"{task} seed {seed}" for task, seed in missing]
+    return ", ".join(names) if len(names) <= 3 else f"{len(names)} runs"
+
+
+def counts(series: Sequence[Series]) -> str:
+    """Seeds per series for a caption, as in ``n = 5 seeds``; per series where they differ."""
+    numbers = {one.label: one.rows["seed"].nunique() for one in series}
+    if len(set(numbers.values())) == 1:
+        return f"n = {_seeds(next(iter(numbers.values())))}"
+    return "n = " + ", ".join(f"{_seeds(number)} ({label})" for label, number in numbers.items())
+
+
+def _seeds(number: int) -> str:
+    return f"{number} seed" if number == 1 else f"{number} seeds"

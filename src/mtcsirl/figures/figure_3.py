@@ -1,0 +1,56 @@
+"""Figure 3: ground-truth cs-reward on unseen tasks; (a) action norm, (b) velocity, (c) correlation for velocity."""
+
+from matplotlib.figure import Figure
+
+from mtcsirl.figures import multi_task
+from mtcsirl.figures.curves import add_legend, counts, draw_curves, missing_note
+from mtcsirl.figures.data import FigureData
+from mtcsirl.figures.scatter import draw_scatter, scatter_caption
+from mtcsirl.figures.style import (
+    TEXT_WIDTH,
+    add_notes,
+    new_figure,
+    panel_title,
+    quantity,
+    scale_notes,
+    styled,
+    target_of,
+)
+
+TITLE = "Ground-truth cs-reward on unseen tasks"
+_SCATTER = "velocity"
+
+
+@styled
+def draw(data: FigureData) -> Figure:
+    """Learning curves of Expert, MT-CSIRL (transferred) and SAC, mean over the unseen tasks, and the scatter."""
+    metrics = data.cs_rewards
+    figure = new_figure(TEXT_WIDTH, 2.15)
+    axes = figure.subplots(1, len(metrics) + 1, squeeze=False)[0]
+    notes: list[str] = []
+    for index, metric in enumerate(metrics):
+        series = multi_task.curve_series(data, metric)
+        draw_curves(axes[index], series, metric, target_of(metric))
+        panel_title(axes[index], index, quantity(metric).capitalize())
+        notes += [f"({chr(ord('a') + index)}) {note}" for note in missing_note(series)]
+    panel_title(axes[-1], len(metrics), "Rewards' correlation")
+    draw_scatter(axes[-1], multi_task.correlation(data, _SCATTER), multi_task.METHOD, _SCATTER)
+    add_legend(figure, list(axes[:-1]))
+    add_notes(figure, notes + scale_notes(data.settings.scale))
+    return figure
+
+
+def caption(data: FigureData) -> str:
+    """What the figure shows."""
+    metrics = data.cs_rewards
+    letters = ", ".join(f"({chr(ord('a') + index)}) {quantity(metric)}" for index, metric in enumerate(metrics))
+    numbers = "; ".join(f"{quantity(metric)}: {counts(multi_task.curve_series(data, metric))}" for metric in metrics)
+    found = multi_task.correlation(data, _SCATTER)
+    return (
+        f"Ground-truth cs-reward on tasks that IRL has not seen ({', '.join(data.settings.multi_task.unseen_tasks)}; "
+        f"mean over them). {letters}: Expert maximises r_task and the true cs-reward, MT-CSIRL r_task and the reward "
+        f"learned from {', '.join(data.settings.multi_task.train_tasks)}, SAC r_task alone; training episodes of the "
+        "stochastic policy. Red line: target. Lines and bands: mean and 95 % t-interval over seeds "
+        f"({numbers}); bands are cut off at the frame. ({chr(ord('a') + len(metrics))}) "
+        f"{scatter_caption(found, _SCATTER)} Scored on {data.settings.multi_task.unseen_tasks[0]}."
+    )

@@ -1,0 +1,20 @@
+"""Figure 5: single task cs-reward on coffee-button; (a) velocity, (b) action norm."""
+
+from matplotlib.figure import Figure
+
+from mtcsirl.design import FIGURE_TASKS
+from mtcsirl.figures import single_target
+from mtcsirl.figures.data import FigureData
+
+TITLE = "Single task cs-reward: coffee-button"
+_TASK = FIGURE_TASKS["figure_5"]
+
+
+def draw(data: FigureData) -> Figure:
+    """Learning curves of IRL agent, Transferred and SAC."""
+    return single_target.draw(data, "figure_5", _TASK, data.cs_rewards[::-1])
+
+
+def caption(data: FigureData) -> str:
+    """What the figure shows."""
+    return single_target.caption(data, "figure_5", _TASK, data.cs_rewards[::-1])

@@ -1,0 +1,138 @@
+"""Scatter of the true against the learned cs-reward, with the correlation over seeds."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from mtcsirl.analysis.statistics import Estimate, mean_correlation
+from mtcsirl.figures.data import FigureData, rows_where
+from mtcsirl.figures.style import TEXT_WIDTH, add_notes, empty_panel, look, new_figure, quantity, scale_notes, styled
+
+SHOWN_POINTS = 2000
+PRIMARY_TRANSITIONS = "sac"
+"""The set of all scatters: the plain SAC agent of the scored task varies in both cs-rewards, the expert hardly does."""
+TRANSITION_SETS = {
+    "expert": "expert transitions",
+    "sac": "plain SAC transitions",
+    "generator": "generator transitions",
+    "uniform": "uniformly random actions",
+}
+
+
+@dataclass(frozen=True)
+class Correlation:
+    """Points and correlation of one learned reward on one transition set, all seeds."""
+
+    points: pd.DataFrame
+    estimate: Estimate
+    transitions: str
+
+    @property
+    def transition_name(self) -> str:
+        """The transition set in words."""
+        return TRANSITION_SETS.get(self.transitions, self.transitions)
+
+    @property
+    def per_seed(self) -> int:
+        """Transitions per seed (the largest number)."""
+        return int(self.points.groupby("seed").size().max()) if len(self.points) else 0
+
+    def counts(self) -> str:
+        """As in ``n = 5 seeds``."""
+        seeds = self.points["seed"].nunique()
+        return f"n = {seeds} seed" if seeds == 1 else f"n = {seeds} seeds"
+
+    def words(self) -> str:
+        """As in ``r = 0.18 [0.05, 0.30]``."""
+        return correlation_words(self.estimate)
+
+
+def select_correlation(
+    data: FigureData,
+    *,
+    experiment: str,
+    method: str,
+    cs_reward: str,
+    source: str,
+    transitions: str = PRIMARY_TRANSITIONS,
+) -> Correlation:
+    """Points and Pearson r of the learned reward of ``source`` on ``transitions``.
+
+    Over seeds r is averaged on Fisher's z scale with a t-interval; one seed keeps the interval that its own row has.
+    """
+    wanted = {"experiment": experiment, "method": method, "cs_reward": cs_reward, "source": source}
+    points = rows_where(data.points, wanted | {"transitions": transitions})
+    rows = rows_where(data.scores, wanted | {"transitions": transitions, "reward": "learned", "statistic": "pearson"})
+    estimate = mean_correlation(rows["value"])
+    if len(rows) == 1:
+        row = rows.iloc[0]
+        estimate = Estimate(row["value"], row["low"], row["high"], 1)
+    return Correlation(points, estimate, transitions)
+
+
+def draw_scatter(axes: Axes, found: Correlation, method: str, cs_reward: str) -> None:
+    """Truth on the horizontal, learned on the vertical axis; one point per transition.
+
+    A learned reward is known up to scale and offset, so each seed's is standardised (mean 0, standard deviation 1).
+    The line is the least-squares fit over the seeds, which all weigh the same.
+    """
+    axes.set_xlabel(f"true cs-reward ({quantity(cs_reward)})")
+    axes.set_ylabel("learned cs-reward\n(standardised per seed)")
+    if found.points.empty:
+        empty_panel(axes, "no runs yet")
+        return
+    standard = standardise(found.points)
+    shown = standard.iloc[np.linspace(0, len(standard) - 1, min(SHOWN_POINTS, len(standard))).astype(int)]
+    axes.scatter(
+        shown["truth"], shown["learned"], s=3, color=look(method).colour, alpha=0.25, linewidths=0, rasterized=True
+    )
+    if standard["truth"].nunique() > 1:
+        slope, offset = np.polyfit(standard["truth"], standard["learned"], 1)
+        ends = np.array([standard["truth"].min(), standard["truth"].max()])
+        axes.plot(ends, slope * ends + offset, color="black", linewidth=1, linestyle="--")
+    low, high = np.percentile(standard["learned"], [0.2, 99.8])
+    margin = 0.08 * max(high - low, 1e-6)
+    axes.set_ylim(low - margin, high + 5 * margin)
+    words = f"{found.words()}\n{found.transition_name}, {found.counts()}"
+    axes.text(
+        0.03, 0.98, words, transform=axes.transAxes, va="top", fontsize=6.5,
+        bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1},
+    )  # fmt: skip
+
+
+def standardise(points: pd.DataFrame) -> pd.DataFrame:
+    """``learned`` with mean 0 and standard deviation 1 within each seed; a constant reward becomes 0."""
+    learned = points.groupby("seed")["learned"]
+    spread = learned.transform("std", ddof=0)
+    centred = points["learned"] - learned.transform("mean")
+    return points.assign(learned=(centred / spread.where(spread > 0)).fillna(0.0))
+
+
+def correlation_words(estimate: Estimate) -> str:
+    """As in ``r = 0.18 [0.05, 0.30]``; without an interval where there is none."""
+    if np.isnan(estimate.value):
+        return "r undefined"
+    interval = "" if np.isnan(estimate.low) else f" [{estimate.low:.2f}, {estimate.high:.2f}]"
+    return f"r = {estimate.value:.2f}{interval}"
+
+
+def scatter_caption(found: Correlation, cs_reward: str) -> str:
+    """What a scatter shows: set, number of points and seeds, correlation with its interval."""
+    interval = "95 % t-interval over seeds on Fisher's z scale" if found.estimate.n > 1 else "95 % bootstrap interval"
+    return (
+        f"True against learned {quantity(cs_reward)} cs-reward on {found.transition_name}: Pearson {found.words()}, "
+        f"{interval}, {found.counts()} with up to {found.per_seed:,} transitions each; "
+        f"at most {SHOWN_POINTS:,} points are drawn. The learned reward is standardised per seed."
+    )
+
+
+@styled
+def scatter_figure(scale: str, found: Correlation, method: str, cs_reward: str) -> Figure:
+    """A figure of one scatter."""
+    figure = new_figure(0.52 * TEXT_WIDTH, 2.4)
+    draw_scatter(figure.subplots(), found, method, cs_reward)
+    add_notes(figure, scale_notes(scale))
+    return figure

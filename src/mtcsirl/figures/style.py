@@ -1,0 +1,134 @@
+"""The look of all figures: one colour, line and marker per method, the notes, and the way to bytes."""
+
+import logging
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from functools import wraps
+from importlib import resources
+from io import BytesIO
+from typing import Literal, NamedTuple, ParamSpec
+
+import matplotlib
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+TEXT_WIDTH = 5.5
+"""Width of the paper's text in inches; figures are drawn at the size at which they are printed."""
+SMOKE_NOTE = "smoke scale: numbers mean nothing"
+TARGET_COLOUR = "#C00000"
+NOTE_COLOUR = "#8C2D04"
+INK = "#222222"
+
+Arguments = ParamSpec("Arguments")
+
+
+class Look(NamedTuple):
+    """How one method is drawn everywhere: readable in colour, in greyscale and for the colour-blind."""
+
+    label: str
+    colour: str
+    linestyle: str | tuple[int, tuple[float, ...]]
+    marker: str
+
+
+LOOKS: dict[str, Look] = {
+    "expert": Look("Expert", "#009E73", (0, (5, 1.5)), "s"),
+    "sac": Look("SAC", "#E69F00", (0, (1, 1.2)), "^"),
+    "irl_agent": Look("IRL agent", "#56B4E9", (0, (4, 1, 1, 1)), "D"),
+    "mt_airl": Look("MT-AIRL", "#CC79A7", (0, (3, 1)), "v"),
+    "mt_vairl": Look("MT-VAIRL", "#8C6D31", (0, (3, 1, 1, 1)), "<"),
+    "mt_vairl_gp": Look("MT-VAIRL-GP", "#7F7F7F", (0, (3, 1, 1, 1, 1, 1)), ">"),
+    "mt_csirl": Look("MT-CSIRL", "#0072B2", "-", "o"),
+    "mt_csirl_lt": Look("MT-CSIRL+LT", "#222222", (0, (8, 2)), "P"),
+}
+"""Okabe-Ito colours; a method that is not listed is drawn by :func:`look` in grey under its own name."""
+
+_QUANTITIES = {
+    "velocity": ("velocity", "m/s"),
+    "action_norm": ("action norm", ""),
+    "success": ("success rate", ""),
+    "task_reward": ("task reward per step", ""),
+}
+
+
+def look(method: str) -> Look:
+    """The look of ``method``; one that the suite does not ship gets grey, so it still shows."""
+    return LOOKS.get(method, Look(method.replace("_", "-").upper(), "#555555", (0, (2, 1)), "X"))
+
+
+def quantity(metric: str) -> str:
+    """Name of a metric in words, as in ``velocity``."""
+    return _QUANTITIES.get(metric, (metric.replace("_", " "), ""))[0]
+
+
+def quantity_label(metric: str) -> str:
+    """Axis label of a metric with its unit."""
+    name, unit = _QUANTITIES.get(metric, (metric.replace("_", " "), ""))
+    return f"{name} ({unit})" if unit else name
+
+
+def target_of(cs_reward: str) -> float:
+    """The value that the ground-truth cs-reward aims at, in its unit."""
+    from mtcsirl.rewards.ground_truth import COMMON_SENSE_REWARDS
+
+    return COMMON_SENSE_REWARDS[cs_reward].target
+
+
+@contextmanager
+def paper_style() -> Iterator[None]:
+    """Draw with the suite's style; no matplotlibrc of the reader has a say."""
+    sheet = resources.files("mtcsirl.figures").joinpath("mtcsirl.mplstyle")
+    with resources.as_file(sheet) as path:
+        parameters = matplotlib.rc_params_from_file(path, use_default_template=True)
+    with matplotlib.rc_context(parameters):
+        yield
+
+
+def styled(draw: Callable[Arguments, Figure]) -> Callable[Arguments, Figure]:
+    """Let a drawing function run inside :func:`paper_style`."""
+
+    @wraps(draw)
+    def inside(*args: Arguments.args, **kwargs: Arguments.kwargs) -> Figure:
+        with paper_style():
+            return draw(*args, **kwargs)
+
+    return inside
+
+
+def new_figure(width: float, height: float) -> Figure:
+    """A figure of ``width`` x ``height`` inches that no global state knows of."""
+    figure = Figure(figsize=(width, height))
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def figure_bytes(figure: Figure, kind: Literal["png", "pdf"]) -> bytes:
+    """The figure as a PNG or PDF file; equal figures give equal bytes (no date, no program name)."""
+    stamp = {"pdf": {"CreationDate": None, "Producer": None}, "png": {"Software": None}}[kind]
+    buffer = BytesIO()
+    logging.getLogger("fontTools").setLevel(logging.ERROR)  # it remarks on the font's own time stamp
+    with paper_style():
+        figure.savefig(buffer, format=kind, metadata=stamp)
+    return buffer.getvalue()
+
+
+def add_notes(figure: Figure, notes: Sequence[str]) -> None:
+    """Write notes under the panels: what is missing, the scale."""
+    if notes:
+        figure.supxlabel("\n".join(notes), fontsize=6.5, color=NOTE_COLOUR)
+
+
+def scale_notes(scale: str) -> list[str]:
+    """The line that every smoke artefact carries."""
+    return [SMOKE_NOTE] if scale == "smoke" else []
+
+
+def empty_panel(axes: Axes, reason: str) -> None:
+    """Say in an empty panel why it is empty."""
+    axes.text(0.5, 0.5, reason, transform=axes.transAxes, ha="center", va="center", color=NOTE_COLOUR)
+
+
+def panel_title(axes: Axes, index: int, text: str) -> None:
+    """Title of a panel as the paper counts them: (a), (b), (c)."""
+    axes.set_title(f"({chr(ord('a') + index)}) {text}", loc="left")

@@ -1,0 +1,83 @@
+"""Learning curves against numbers worked out by hand."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from mtcsirl.figures.curves import Series, counts, draw_curves, missing_note, summarise_curve
+from mtcsirl.figures.style import LOOKS, new_figure
+
+
+def rows(values: dict[tuple[str, int], list[float]], steps=(500, 1000)) -> pd.DataFrame:
+    return pd.DataFrame(
+        [
+            {"task": task, "seed": seed, "step": step, "value": value}
+            for (task, seed), line in values.items()
+            for step, value in zip(steps, line, strict=False)
+        ]
+    )
+
+
+def series(values, expected, steps=(500, 1000)) -> Series:
+    frame = rows(values, steps) if values else pd.DataFrame(columns=["task", "seed", "step", "value"])
+    return Series("SAC", LOOKS["sac"], frame, tuple(expected))
+
+
+def test_mean_and_t_interval_over_seeds():
+    curve = summarise_curve(rows({("a", 0): [1.0, 2.0], ("a", 1): [3.0, 2.0], ("a", 2): [2.0, 2.0]}))
+    half = 4.302652729911275 * 1.0 / np.sqrt(3)  # t(0.975, 2) times the standard error of 1, 3, 2
+    assert curve["mean"].tolist() == [2.0, 2.0]
+    assert curve.loc[0, ["low", "high"]].tolist() == pytest.approx([2 - half, 2 + half])
+    assert curve.loc[1, ["low", "high"]].tolist() == pytest.approx([2.0, 2.0])
+    assert curve["n"].tolist() == [3, 3]
+    assert curve["step"].tolist() == [500, 1000]
+
+
+def test_each_task_counts_once_however_many_rows_it_has():
+    frame = pd.concat([rows({("a", 0): [1.0] * 2}), *[rows({("b", 0): [4.0] * 2})] * 3])
+    assert summarise_curve(frame)["mean"].tolist() == [2.5, 2.5]
+
+
+def test_curves_end_with_the_shortest_run():
+    frame = rows({("a", 0): [1.0, 1.0, 1.0, 1.0], ("a", 1): [3.0, 3.0]}, steps=(500, 1000, 1500, 2000))
+    curve = summarise_curve(frame)
+    assert curve["step"].max() == 1000
+    assert curve["mean"].tolist() == [2.0, 2.0]
+
+
+def test_one_seed_has_no_interval():
+    assert summarise_curve(rows({("a", 0): [1.0, 2.0]}))[["low", "high"]].isna().all(axis=None)
+
+
+def test_bins_average_steps():
+    curve = summarise_curve(rows({("a", 0): list(range(100))}, steps=range(1, 101)), bins=10)
+    assert len(curve) == 10
+    assert curve["mean"].tolist() == pytest.approx([4.5 + 10 * k for k in range(10)])
+
+
+def test_missing_runs_are_named():
+    some = series({("a", 0): [1.0, 1.0]}, [("a", 0), ("a", 1)])
+    assert missing_note([some]) == ["not there yet – SAC: a seed 1"]
+    assert missing_note([series({}, [("a", 0)])]) == ["not there yet – SAC: all runs"]
+    assert missing_note([series({("a", 0): [1.0, 1.0]}, [("a", 0)])]) == []
+    many = series({("a", 0): [1.0, 1.0]}, [("a", seed) for seed in range(5)])
+    assert missing_note([many]) == ["not there yet – SAC: 4 runs"]
+
+
+def test_counts_differ_by_method():
+    one, two = series({("a", 0): [1.0]}, []), series({("a", 0): [1.0], ("a", 1): [1.0]}, [])
+    assert counts([two, two]) == "n = 2 seeds"
+    assert counts([two, Series("Expert", LOOKS["expert"], one.rows, ())]) == "n = 2 seeds (SAC), 1 seed (Expert)"
+
+
+def test_target_stays_in_sight_when_an_interval_is_huge():
+    axes = new_figure(2, 2).subplots()
+    draw_curves(axes, [series({("a", 0): [0.1, 0.1], ("a", 1): [0.7, 0.7]}, [])], "velocity", 0.8)
+    assert axes.get_ylim() == pytest.approx((0, 0.96))
+    assert any(np.allclose(line.get_ydata(), 0.8) for line in axes.lines)
+
+
+def test_panel_without_runs_says_so():
+    axes = new_figure(2, 2).subplots()
+    draw_curves(axes, [series({}, [("a", 0)])], "velocity", 0.8)
+    assert "no runs yet" in [text.get_text() for text in axes.texts]

@@ -1,0 +1,90 @@
+"""Scatter and its correlation against known answers."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from mtcsirl.analysis.statistics import Estimate
+from mtcsirl.figures.data import FigureData
+from mtcsirl.figures.scatter import (
+    SHOWN_POINTS,
+    correlation_words,
+    draw_scatter,
+    scatter_caption,
+    select_correlation,
+    standardise,
+)
+from mtcsirl.figures.style import new_figure
+
+KEY = {"experiment": "single_target", "method": "mt_csirl", "cs_reward": "velocity", "source": "reach-wall"}
+
+
+def score(seed: int, value: float, **changes) -> dict:
+    row = KEY | {"seed": seed, "transitions": "sac", "reward": "learned", "statistic": "pearson"}
+    return row | {"value": value, "low": value - 0.1, "high": value + 0.1, "n": 9} | changes
+
+
+def points(seed: int, truth, learned, transitions="sac") -> pd.DataFrame:
+    return pd.DataFrame(
+        KEY
+        | {
+            "seed": seed,
+            "transitions": transitions,
+            "episode": 0,
+            "truth": truth,
+            "learned": learned,
+            "task_reward": 0.0,
+        }
+    )
+
+
+def test_correlation_is_averaged_on_fishers_scale(settings):
+    scores = pd.DataFrame(
+        [score(0, 0.2), score(1, 0.8), score(2, 0.9, transitions="expert"), score(3, 0.9, reward="zero")]
+    )
+    found = select_correlation(FigureData(settings=settings, scores=scores), **KEY)
+    assert found.estimate.value == pytest.approx(np.tanh((np.arctanh(0.2) + np.arctanh(0.8)) / 2))
+    assert found.estimate.n == 2
+
+
+def test_one_seed_keeps_its_own_interval(settings):
+    found = select_correlation(FigureData(settings=settings, scores=pd.DataFrame([score(0, 0.5)])), **KEY)
+    assert found.estimate == Estimate(0.5, 0.4, 0.6, 1)
+    assert found.words() == "r = 0.50 [0.40, 0.60]"
+
+
+def test_only_points_of_the_chosen_set_and_reward(settings):
+    frame = pd.concat([points(0, [0.0, 1.0], [0.0, 1.0]), points(0, [5.0], [5.0], "expert")])
+    found = select_correlation(FigureData(settings=settings, points=frame), **KEY)
+    assert found.points["truth"].tolist() == [0.0, 1.0]
+    assert select_correlation(FigureData(settings=settings, points=frame), **KEY | {"method": "mt_airl"}).points.empty
+
+
+def test_standardised_within_each_seed():
+    frame = pd.concat([points(0, [0, 1, 2], [10.0, 20.0, 30.0]), points(1, [0, 1, 2], [-1.0, -1.0, -1.0])])
+    learned = standardise(frame)["learned"].tolist()
+    assert learned == pytest.approx([-np.sqrt(1.5), 0, np.sqrt(1.5), 0, 0, 0])
+
+
+def test_fitted_line_follows_the_points(settings):
+    truth = np.linspace(-1, 0, 50)
+    found = select_correlation(FigureData(settings=settings, points=points(0, truth, 3 * truth + 7)), **KEY)
+    axes = new_figure(2, 2).subplots()
+    draw_scatter(axes, found, "mt_csirl", "velocity")
+    slope = np.diff(axes.lines[0].get_ydata()) / np.diff(axes.lines[0].get_xdata())
+    assert slope == pytest.approx(1 / truth.std())
+
+
+def test_few_points_are_drawn_of_many(settings):
+    found = select_correlation(
+        FigureData(settings=settings, points=points(0, np.arange(9_000.0), np.arange(9_000.0))), **KEY
+    )
+    axes = new_figure(2, 2).subplots()
+    draw_scatter(axes, found, "mt_csirl", "velocity")
+    assert len(axes.collections[0].get_offsets()) == SHOWN_POINTS
+    assert "9,000 transitions" in scatter_caption(found, "velocity")
+
+
+def test_words_without_interval_or_value():
+    assert correlation_words(Estimate(0.18, np.nan, np.nan, 1)) == "r = 0.18"
+    assert correlation_words(Estimate(np.nan, np.nan, np.nan, 0)) == "r undefined"
