@@ -43,8 +43,9 @@ class Discriminator:
         self._gradient = torch.zeros_like(network.parameters, requires_grad=False)
         self._adam = FlatAdam(network.parameters.detach(), self._gradient, learning_rate)
 
-    def forward(self, batch: Batch) -> Pass:
-        """Run the network over both sides of a minibatch."""
+    def forward(self, batch: Batch, *, noise: bool = True) -> Pass:
+        """Run the network over both sides of a minibatch; ``noise``: sample a bottleneck's z or take its mean."""
+        random = self._random if noise else None
         expert = Points(network_inputs(batch.expert), batch.expert.task_reward, batch.expert_log_pi)
         generator = Points(network_inputs(batch.generator), batch.generator.task_reward, batch.generator_log_pi)
         return Pass(
@@ -52,8 +53,8 @@ class Discriminator:
             expert,
             generator,
             batch.temperature,
-            self.network.output(expert.inputs, self._random),
-            self.network.output(generator.inputs, self._random),
+            self.network.output(expert.inputs, random),
+            self.network.output(generator.inputs, random),
             self._random,
         )
 
@@ -71,9 +72,9 @@ class Discriminator:
         return loss.detach(), gradient.norm()
 
     def logits(self, batch: Batch) -> tuple[Tensor, Tensor]:
-        """Logits of expert and generator [T, B], without gradient."""
+        """Logits of expert and generator [T, B], without gradient and without noise."""
         with torch.no_grad():
-            return self.loss.logits(self.forward(batch))
+            return self.loss.logits(self.forward(batch, noise=False))
 
     def state(self) -> dict[str, Tensor]:
         """The tensors that a checkpoint needs (not copies, but for the random state)."""

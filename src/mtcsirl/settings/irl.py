@@ -57,6 +57,12 @@ class IrlSettings(Frozen):
         paper=1,
         gt=0,
     )
+    generator_memory: int = key(
+        100_000,
+        "replay memory of each generator's SAC; the oldest transitions go first",
+        unit="transitions",
+        gt=0,
+    )
     schedule: Literal["as_printed", "batched"] = key(
         "batched", "loop over tasks as printed, or one tensor program over all tasks", paper="as_printed"
     )

@@ -7,9 +7,16 @@ import numpy as np
 import torch
 
 from mtcsirl.irl.discriminator import Discriminator
-from mtcsirl.irl.losses import GradientPenalty, Loss, PenaltyPoints
+from mtcsirl.irl.losses import (
+    Adversarial,
+    GradientPenalty,
+    InformationBottleneck,
+    Loss,
+    PenaltyPoints,
+    entire_reward_logit,
+)
 from mtcsirl.rewards.networks import RewardNetwork
-from mtcsirl.settings import IrlSettings
+from mtcsirl.settings import DiscriminatorSettings, IrlSettings
 
 
 @dataclass(frozen=True)
@@ -63,3 +70,10 @@ class Setup:
 def penalised(loss: Loss, weight: float, points: PenaltyPoints) -> Loss:
     """``loss`` with a gradient penalty, or as it is where the weight is 0."""
     return GradientPenalty(loss, weight, points) if weight > 0 else loss
+
+
+def bottlenecked(settings: DiscriminatorSettings) -> InformationBottleneck:
+    """Equation 1's loss under VAIRL's constraint KL <= I_c."""
+    return InformationBottleneck(
+        Adversarial(entire_reward_logit), settings.information_constraint, settings.initial_beta, settings.beta_step
+    )

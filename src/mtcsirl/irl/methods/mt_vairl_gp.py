@@ -2,8 +2,7 @@
 
 from mtcsirl.irl.discriminator import Method
 from mtcsirl.irl.losses import expert_points
-from mtcsirl.irl.methods.base import Setup, penalised
-from mtcsirl.irl.methods.mt_vairl import bottlenecked
+from mtcsirl.irl.methods.base import Setup, bottlenecked, penalised
 
 
 def mt_vairl_gp(setup: Setup) -> Method:

@@ -1,0 +1,55 @@
+"""What the generators do in their environments."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from mtcsirl.agents.lockstep import Environments, Outcome
+from mtcsirl.transitions import RewardFunction, Transitions
+
+
+@dataclass(frozen=True)
+class World:
+    """The T tasks of an IRL run and how to measure what happens in them; all functions take what the agent sees."""
+
+    members: tuple[tuple[str, int], ...]
+    """(task, target) of each environment."""
+    environments: Environments
+    truth: RewardFunction
+    """The ground-truth cs-reward: for diagnostics alone, nothing is trained on it."""
+    measure_episode: Callable[[np.ndarray, np.ndarray, np.ndarray, bool], dict[str, float]]
+    """(action [n, A], next observation [n, O], task reward [n], solved) of one episode -> metrics by name."""
+
+
+Act = Callable[[np.ndarray], np.ndarray]
+"""Observations [T, O] -> actions [T, A]."""
+OnStep = Callable[[np.ndarray, np.ndarray, Outcome], None]
+"""(observation [T, O], action [T, A], outcome) of one environment step."""
+
+
+def collect(environments: Environments, act: Act, steps: int, episode_steps: int, on_step: OnStep) -> np.ndarray:
+    """``steps`` steps in every environment, from a reset and with one every ``episode_steps``; success [T, steps].
+
+    Starting each iteration from a reset ("sample trajectories" in Algorithms 1 and 2) leaves nothing of the simulator
+    to save between iterations.
+    """
+    success = []
+    observation = np.empty(0)
+    for step in range(steps):
+        if step % episode_steps == 0:
+            observation = environments.reset()
+        action = act(observation)
+        outcome = environments.step(action)
+        on_step(observation, action, outcome)
+        success.append(outcome.success)
+        observation = outcome.next_observation
+    return np.stack(success, axis=1)
+
+
+def gather(transitions: Transitions, index: Tensor) -> Transitions:
+    """Rows ``index`` [T, B] of transitions [T, N]: transitions [T, B]."""
+    task = torch.arange(index.shape[0]).unsqueeze(1)
+    return Transitions(*(part[task, index] for part in transitions))

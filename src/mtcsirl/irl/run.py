@@ -1,0 +1,207 @@
+"""One IRL run from demonstrations to artefacts: reward, generators, curves, diagnostics, evaluation."""
+
+import dataclasses
+import functools
+import hashlib
+import json
+import logging
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import torch
+from torch import Tensor
+
+from mtcsirl.agents.lockstep import make_environments
+from mtcsirl.agents.policy import Policy, save_policy
+from mtcsirl.agents.relabelling import ground_truth
+from mtcsirl.demonstrations import load_demonstrations
+from mtcsirl.environments import OBSERVATION_MAPS
+from mtcsirl.errors import UserError
+from mtcsirl.evaluation import COLUMNS, evaluate, gate_verdict, measure_episode, stochastic_means
+from mtcsirl.irl.diagnostics import CURVE_COLUMNS, DIAGNOSTIC_COLUMNS
+from mtcsirl.irl.methods import METHODS
+from mtcsirl.irl.methods.base import Setup
+from mtcsirl.irl.rollout import World
+from mtcsirl.irl.trainer import IrlTrainer
+from mtcsirl.rewards.ground_truth import COMMON_SENSE_REWARDS
+from mtcsirl.rewards.learned import LearnedReward, save_learned_reward
+from mtcsirl.settings.runs import IrlRunSettings
+from mtcsirl.storage import checksum, read_tensors, remove, write_csv, write_json, write_parquet, write_tensors
+from mtcsirl.transitions import Transitions
+
+CHECKPOINT = "checkpoint.safetensors"
+SAMPLED_ROLLOUTS = 10
+"""Last rollouts of each generator that ``samples.parquet`` keeps."""
+
+_LOG = logging.getLogger(__name__)
+
+
+def learn_reward(
+    folder: Path | str,
+    method: str,
+    cs_reward: str,
+    demonstrations: Sequence[Path | str],
+    seed: int,
+    settings: IrlRunSettings,
+    *,
+    about: Mapping[str, Any] | None = None,
+) -> None:
+    """Learn a reward from T files of demonstrations, one per (task, target), and write the run into ``folder``.
+
+    ``cs_reward`` names what the experts were trained with; it is measured, never trained on. A checkpoint in
+    ``folder`` of the same run is taken up, and the run ends with the bytes of one that was never stopped.
+
+    Raises:
+        UserError: unknown method or cs-reward; unreadable demonstrations.
+    """
+    folder = Path(folder)
+    trainer = make_trainer(method, cs_reward, demonstrations, seed, settings)
+    try:
+        run = _fingerprint(method, cs_reward, [checksum(file) for file in demonstrations], seed, settings)
+        _train(trainer, folder / CHECKPOINT, run)
+        _write(trainer, folder, cs_reward, seed, dict(about or {}))
+    finally:
+        trainer.world.environments.close()
+    remove(folder / CHECKPOINT)
+
+
+def make_trainer(
+    method: str, cs_reward: str, demonstrations: Sequence[Path | str], seed: int, settings: IrlRunSettings
+) -> IrlTrainer:
+    """The trainer of a run on Meta-World; see ``learn_reward``."""
+    if method not in METHODS:
+        raise UserError(f"method: unknown {method!r}; known: {', '.join(METHODS)}")
+    if cs_reward not in COMMON_SENSE_REWARDS:
+        raise UserError(f"cs_reward: unknown {cs_reward!r}; known: {', '.join(COMMON_SENSE_REWARDS)}")
+    observation = settings.environment.observation
+    experts = load_demonstrations(demonstrations, episodes=settings.demonstration_episodes, observation=observation)
+    world = World(
+        members=experts.members,
+        environments=make_environments(experts.members, settings.environment),
+        truth=ground_truth(cs_reward, observation),
+        measure_episode=functools.partial(measure_episode, observation=observation),
+    )
+    setup = Setup(irl=settings.irl, tasks=len(experts.members), seed=seed, discount=settings.sac.discount)
+    return IrlTrainer(METHODS[method](setup), world, experts.transitions, settings, seed)
+
+
+def _train(trainer: IrlTrainer, checkpoint: Path, fingerprint: str) -> None:
+    """Iterate to the end, from the checkpoint if it is of this very run."""
+    settings = trainer.settings
+    if checkpoint.is_file():
+        _resume(trainer, checkpoint, fingerprint)
+    every = max(1, settings.progress.checkpoint_every // settings.irl.steps_per_iteration)
+    while trainer.iteration < trainer.iterations:
+        trainer.iterate()
+        _LOG.info("%s", _progress(trainer))
+        if trainer.iteration % every == 0 and trainer.iteration < trainer.iterations:
+            write_tensors(checkpoint, trainer.state() | _rows_to_tensors(trainer, fingerprint))
+
+
+def _progress(trainer: IrlTrainer) -> str:
+    last = [row for row in trainer.curve if row["step"] == trainer.curve[-1]["step"]]
+    means = pd.DataFrame(last).groupby("metric", sort=False)["value"].mean()
+    text = ", ".join(f"{metric} {value:.3g}" for metric, value in means.items())
+    return f"{trainer.method.name} iteration {trainer.iteration}/{trainer.iterations}: {text}"
+
+
+def _fingerprint(*parts: Any) -> str:
+    """Changes with anything that the result of a run depends on."""
+    plain = [part.model_dump(mode="json") if isinstance(part, IrlRunSettings) else part for part in parts]
+    return hashlib.sha256(json.dumps(plain, sort_keys=True).encode()).hexdigest()
+
+
+def _rows_to_tensors(trainer: IrlTrainer, fingerprint: str) -> dict[str, Tensor]:
+    """The rows so far as bytes: a checkpoint is one file, so it is all there or not at all."""
+    text = json.dumps({"run": fingerprint, "curve": trainer.curve, "diagnostics": trainer.diagnostics})
+    return {"json": torch.from_numpy(np.frombuffer(text.encode(), dtype=np.uint8).copy())}
+
+
+def _resume(trainer: IrlTrainer, checkpoint: Path, fingerprint: str) -> None:
+    try:
+        tensors = read_tensors(checkpoint)
+        rows = json.loads(tensors.pop("json").numpy().tobytes())
+    except (UserError, KeyError, ValueError):
+        _LOG.warning("%s: unreadable; starting over", checkpoint)
+        return
+    if rows["run"] != fingerprint:
+        _LOG.warning("%s: of a run with other settings; starting over", checkpoint)
+        return
+    trainer.load_state(tensors)
+    trainer.curve, trainer.diagnostics = rows["curve"], rows["diagnostics"]
+
+
+def _write(trainer: IrlTrainer, folder: Path, cs_reward: str, seed: int, about: dict[str, Any]) -> None:
+    discriminators = trainer.method.discriminators
+    reward = LearnedReward(
+        network=discriminators["f"].network,
+        method=trainer.method.name,
+        cs_reward=cs_reward,
+        observation=trainer.settings.environment.observation,
+        members=trainer.world.members,
+        task_network=discriminators["task"].network if "task" in discriminators else None,
+        about={"seed": seed, **about},
+    )
+    write_csv(folder / "curve.csv", pd.DataFrame(trainer.curve, columns=list(CURVE_COLUMNS)))
+    write_csv(folder / "diagnostics.csv", pd.DataFrame(trainer.diagnostics, columns=list(DIAGNOSTIC_COLUMNS)))
+    write_parquet(folder / "samples.parquet", _samples(trainer))
+    _evaluate(trainer, folder, cs_reward, seed)
+    save_learned_reward(reward, folder)
+
+
+def _evaluate(trainer: IrlTrainer, folder: Path, cs_reward: str, seed: int) -> None:
+    """Save and evaluate each generator; the run passes its gate if every generator does."""
+    settings, rows, verdicts = trainer.settings, [], []
+    for index, (task, target) in enumerate(trainer.world.members):
+        policy = _policy(trainer, index)
+        save_policy(policy, folder / "policies", f"{task}-t{target}")
+        own = evaluate(policy, task, target, cs_reward, seed, settings)
+        rows += own
+        verdict = gate_verdict("generator", stochastic_means(own), cs_reward, settings.gates)
+        verdicts.append({"task": task, "target": target, **verdict})
+    write_csv(folder / "evaluation.csv", pd.DataFrame(rows, columns=list(COLUMNS)))
+    write_json(
+        folder / "gate.json",
+        {
+            "gate": "generator",
+            "passed": all(verdict["passed"] for verdict in verdicts),
+            "success": float(np.mean([verdict["success"] for verdict in verdicts])),
+            "metric": float(np.mean([verdict["metric"] for verdict in verdicts])),
+            "limits": verdicts[0]["limits"],
+            "members": verdicts,
+        },
+    )
+
+
+def _policy(trainer: IrlTrainer, index: int) -> Policy:
+    return dataclasses.replace(trainer.sac.policy(index), observation=trainer.settings.environment.observation)
+
+
+def _samples(trainer: IrlTrainer) -> pd.DataFrame:
+    """The last rollouts of every generator in raw units, columns as in demonstrations (without success)."""
+    length = trainer.irl.steps_per_iteration
+    steps = min(SAMPLED_ROLLOUTS * length, trainer.replay.size)
+    seen = OBSERVATION_MAPS[trainer.settings.environment.observation]
+    latest = trainer.replay.latest(steps)
+    frames = []
+    for index, (task, target) in enumerate(trainer.world.members):
+        own = Transitions(*(part[index] for part in latest))
+        episode_length = min(length, trainer.settings.evaluation.episode_steps)
+        frames.append(
+            pd.DataFrame(
+                {
+                    "observation": list(seen.invert(own.observation).numpy()),
+                    "action": list(own.action.numpy()),
+                    "next_observation": list(seen.invert(own.next_observation).numpy()),
+                    "task_reward": own.task_reward.numpy(),
+                    "task": task,
+                    "target": target,
+                    "episode": np.arange(steps) // episode_length,
+                    "step": np.arange(steps) % episode_length,
+                }
+            )
+        )
+    return pd.concat(frames, ignore_index=True)

@@ -1,0 +1,217 @@
+"""Algorithms 1 and 2: generators and discriminators in turn, T tasks in one process."""
+
+from collections.abc import Mapping
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from mtcsirl.agents.lockstep import Outcome
+from mtcsirl.agents.replay import Replay
+from mtcsirl.agents.sac import FusedSac
+from mtcsirl.irl.curriculum import Curriculum
+from mtcsirl.irl.diagnostics import (
+    Row,
+    discriminator_measures,
+    episode_rows,
+    log_pi_measures,
+    rows_per_task,
+)
+from mtcsirl.irl.discriminator import Batch, Discriminator, Method
+from mtcsirl.irl.losses import clamp_log_pi
+from mtcsirl.irl.rollout import World, collect, gather
+from mtcsirl.rewards.networks import RewardNetwork
+from mtcsirl.settings.runs import IrlRunSettings
+from mtcsirl.transitions import Transitions
+
+DIAGNOSED = 1024
+"""Transitions per side and task that the diagnostics of an iteration look at."""
+
+
+class IrlTrainer:
+    """One IRL run.
+
+    An iteration is, as printed: every generator samples ``steps_per_iteration`` steps; for t in T, D_updates
+    discriminator updates on task t; G_updates updates of generator t on relabelled samples. A generator's update
+    touches neither another generator nor a discriminator, and log pi_t of task t's samples is that of the policy at
+    the start of its turn. So all discriminator updates may come first, if generator t later earns the f that stood
+    after its own turn, and all generators may then learn in one tensor program: ``schedule: as_printed`` does this and
+    equals the printed order. ``schedule: batched`` also joins the tasks' discriminator updates: D_updates steps on the
+    summed loss of all tasks instead of T x D_updates steps on one task's loss each. For T = 1, and for the per-task
+    rewards of MT-CSIRL+LT, the two are the same; for a shared f the batched one takes fewer steps and no task is last.
+    """
+
+    def __init__(
+        self, method: Method, world: World, demonstrations: Transitions, settings: IrlRunSettings, seed: int
+    ) -> None:
+        """``demonstrations`` [T, N] are seen as the agent sees them."""
+        self.method, self.world, self.settings = method, world, settings
+        self.irl = settings.irl
+        self._demonstrations = demonstrations
+        tasks, steps = len(world.members), self.irl.steps_per_iteration
+        *seeds, own, replayed = (int(n) for n in np.random.SeedSequence(seed).generate_state(tasks + 2))
+        state, action = demonstrations.observation.shape[-1], demonstrations.action.shape[-1]
+        self.sac = FusedSac(tasks, settings.sac, seeds=seeds, observation_size=state, action_size=action)
+        capacity = min(self.irl.generator_memory, self.iterations * steps)
+        self.replay = Replay(tasks, capacity, seed=replayed, observation_size=state, action_size=action)
+        self.curriculum = Curriculum(tasks, self.irl.curriculum_window)
+        self._random = torch.Generator().manual_seed(own)
+        self._paying: dict[str, RewardNetwork] = {}
+        self.iteration = 0
+        self.curve: list[Row] = []
+        self.diagnostics: list[Row] = []
+
+    @property
+    def iterations(self) -> int:
+        """All iterations, the same for every method: one without the task reward spends its warm-up on IRL."""
+        return self.irl.warm_up_iterations + self.irl.iterations
+
+    @property
+    def _warming_up(self) -> bool:
+        return self.method.knows_task_reward and self.iteration < self.irl.warm_up_iterations
+
+    def iterate(self) -> None:
+        """One outer iteration of Algorithm 1 or 2."""
+        steps, episode = self.irl.steps_per_iteration, self.settings.evaluation.episode_steps
+        success = collect(self.world.environments, self._act, steps, episode, self._on_step)
+        if not self._warming_up:
+            self._note_discriminators(self._update_discriminators())
+        for _ in range(self.irl.generator_updates):
+            sample = self.replay.sample(self.settings.sac.minibatch)
+            self.sac.update(sample.observation, sample.action, self.policy_reward(sample), sample.next_observation)
+        self._note_generators(self.replay.latest(steps), success)
+        self.iteration += 1
+
+    # --- generators ---------------------------------------------------------------------------------------------
+
+    def _act(self, observation: np.ndarray) -> np.ndarray:
+        if self.replay.size < self.settings.sac.random_steps:
+            shape = (len(observation), self.sac.action_size)
+            return (2.0 * torch.rand(shape, generator=self._random) - 1.0).numpy()
+        return self.sac.act(torch.from_numpy(observation).float()).numpy()
+
+    def _on_step(self, observation: np.ndarray, action: np.ndarray, outcome: Outcome) -> None:
+        self.replay.add(observation, action, outcome.next_observation, outcome.task_reward)
+        self.curriculum.add(torch.from_numpy(outcome.task_reward))
+
+    def alpha(self) -> Tensor:
+        """The weight of f in each generator's reward [T]."""
+        use = self.irl.curriculum and self.method.uses_curriculum
+        weight = self.curriculum.weight() if use else torch.ones(len(self.world.members))
+        return self.irl.cs_weight * weight
+
+    def policy_reward(self, transitions: Transitions) -> Tensor:
+        """What the generators are paid for transitions [T, B], under the rewards of this moment."""
+        task_reward = self.irl.task_reward_scale * transitions.task_reward
+        if self._warming_up:
+            return task_reward
+        learned = {name: network(transitions) for name, network in self._paying.items()}
+        return self.method.policy_reward(task_reward, learned, self.alpha().unsqueeze(1))
+
+    # --- discriminators -----------------------------------------------------------------------------------------
+
+    def _update_discriminators(self) -> dict[str, float]:
+        """D_updates per task; returns the mean norm of each discriminator's gradients."""
+        batches = [self._batch(self.irl.discriminator.minibatch) for _ in range(self.irl.discriminator_updates)]
+        as_printed = self.irl.schedule == "as_printed"
+        norms = {}
+        for name, discriminator in self.method.discriminators.items():
+            update = self._update_as_printed if as_printed else self._update_batched
+            self._paying[name], norms[name] = update(discriminator, batches)
+        return norms
+
+    @staticmethod
+    def _update_batched(discriminator: Discriminator, batches: list[Batch]) -> tuple[RewardNetwork, float]:
+        norms = [discriminator.update(batch)[1] for batch in batches]
+        return discriminator.network, float(torch.stack(norms).mean())
+
+    def _update_as_printed(self, discriminator: Discriminator, batches: list[Batch]) -> tuple[RewardNetwork, float]:
+        """Task after task; the returned network holds, for each task, f as it stood after that task's turn."""
+        if discriminator.network.members > 1:
+            return self._update_batched(discriminator, batches)
+        norms, after_turn = [], []
+        for task in range(len(self.world.members)):
+            norms += [discriminator.update(batch.only(task))[1] for batch in batches]
+            after_turn.append(discriminator.network.parameters.detach().clone())
+        paying = RewardNetwork.from_parameters(discriminator.network.architecture, torch.cat(after_turn))
+        return paying, float(torch.stack(norms).mean())
+
+    def _batch(self, minibatch: int) -> Batch:
+        """Expert and generator transitions [T, minibatch] with log pi under the current policies."""
+        tasks, held = self._demonstrations.task_reward.shape
+        index = torch.randint(held, (tasks, minibatch), generator=self._random)
+        expert = self._scaled(gather(self._demonstrations, index))
+        window = self.irl.generator_replay * self.irl.steps_per_iteration
+        generator = self._scaled(self.replay.sample(minibatch, recent=window))
+        log_pi = self.sac.log_prob(
+            torch.cat((expert.observation, generator.observation), dim=1),
+            torch.cat((expert.action, generator.action), dim=1),
+        )
+        log_pi = clamp_log_pi(log_pi, self.irl.discriminator.log_pi_clamp)
+        temperature = self.sac.temperature.unsqueeze(1)
+        if self.irl.logit_temperature == "as_printed":
+            temperature = torch.ones_like(temperature)
+        return Batch(expert, generator, log_pi[:, :minibatch], log_pi[:, minibatch:], temperature)
+
+    def _scaled(self, transitions: Transitions) -> Transitions:
+        return transitions._replace(task_reward=self.irl.task_reward_scale * transitions.task_reward)
+
+    # --- reporting and resuming ---------------------------------------------------------------------------------
+
+    @property
+    def _steps_after(self) -> int:
+        """Environment steps of each generator when this iteration ends."""
+        return (self.iteration + 1) * self.irl.steps_per_iteration
+
+    def _note_discriminators(self, norms: Mapping[str, float]) -> None:
+        """Rows on the discriminators, between their updates and the generators'."""
+        members, batch = self.world.members, self._batch(DIAGNOSED)
+        for metric, values in log_pi_measures(batch).items():
+            self.diagnostics += rows_per_task(members, self._steps_after, metric, values, discriminator="")
+        for name, discriminator in self.method.discriminators.items():
+            measures = discriminator_measures(discriminator, batch, self.world.truth)
+            shared = {"gradient_norm": norms[name], **discriminator.loss.metrics()}
+            measures |= {metric: torch.full((len(members),), value) for metric, value in shared.items()}
+            for metric, values in measures.items():
+                self.diagnostics += rows_per_task(members, self._steps_after, metric, values, discriminator=name)
+
+    def _note_generators(self, rollout: Transitions, success: np.ndarray) -> None:
+        """Rows on the episodes and on the generators' learning."""
+        members, start = self.world.members, self.iteration * self.irl.steps_per_iteration
+        self.curve += episode_rows(self.world, rollout, success, start, self.settings.evaluation.episode_steps)
+        learning = self.sac.metrics() | {"temperature": self.sac.temperature, "curriculum": self.alpha()}
+        for metric in ("temperature", "curriculum"):
+            self.curve += rows_per_task(members, self._steps_after, metric, learning[metric])
+        for metric, values in learning.items():
+            self.diagnostics += rows_per_task(members, self._steps_after, metric, values, discriminator="")
+
+    def state(self) -> dict[str, Tensor]:
+        """Everything that an exact resume between two iterations needs, as named tensors."""
+        parts: dict[str, Mapping[str, Tensor]] = {
+            "sac": self.sac.state_dict(),
+            "replay": self.replay.state_dict(),
+            "curriculum": self.curriculum.state(),
+            "trainer": {"random": self._random.get_state(), "iteration": torch.tensor(self.iteration)},
+        }
+        parts |= {f"discriminator_{name}": one.state() for name, one in self.method.discriminators.items()}
+        return {f"{part}.{name}": tensor for part, state in parts.items() for name, tensor in state.items()}
+
+    def load_state(self, state: Mapping[str, Tensor]) -> None:
+        """Restore what ``state`` gave; the rows in ``curve`` and ``diagnostics`` are the caller's to restore."""
+        part = _parts(state)
+        self.sac.load_state_dict(part["sac"])
+        self.replay.load_state_dict(part["replay"])
+        for name, tensor in self.curriculum.state().items():
+            tensor.copy_(part["curriculum"][name])
+        self._random.set_state(part["trainer"]["random"])
+        self.iteration = int(part["trainer"]["iteration"])
+        for name, discriminator in self.method.discriminators.items():
+            discriminator.load_state(part[f"discriminator_{name}"])
+
+
+def _parts(state: Mapping[str, Tensor]) -> dict[str, dict[str, Tensor]]:
+    parts: dict[str, dict[str, Tensor]] = {}
+    for name, tensor in state.items():
+        part, _, rest = name.partition(".")
+        parts.setdefault(part, {})[rest] = tensor
+    return parts

@@ -1,0 +1,245 @@
+"""Algorithms 1 and 2 at toy size."""
+
+import json
+
+import numpy as np
+import pandas as pd
+import pytest
+import torch
+
+from mtcsirl.agents.lockstep import Outcome
+from mtcsirl.errors import UserError
+from mtcsirl.irl.methods import METHODS
+from mtcsirl.irl.methods.base import Setup
+from mtcsirl.irl.rollout import collect
+from mtcsirl.irl.run import CHECKPOINT, learn_reward, make_trainer
+from mtcsirl.irl.trainer import IrlTrainer
+from mtcsirl.rewards.learned import load_learned_reward
+from mtcsirl.storage import checksum
+from mtcsirl.transitions import Transitions
+from tests.irl.conftest import MEMBERS, irl_settings
+
+FILES = ("reward.safetensors", "curve.csv", "diagnostics.csv", "evaluation.csv", "gate.json", "samples.parquet")
+
+
+def _trainer(method: str, demonstrations, **irl) -> IrlTrainer:
+    return make_trainer(method, "velocity", demonstrations, 100, irl_settings(**irl))
+
+
+def _run(trainer: IrlTrainer, iterations: int | None = None) -> IrlTrainer:
+    for _ in range(iterations or trainer.iterations):
+        trainer.iterate()
+    return trainer
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_every_method_trains_and_leaves_a_whole_run(method, demonstrations, tmp_path) -> None:
+    learn_reward(tmp_path, method, "velocity", demonstrations, 100, irl_settings(), about={"experiment": "multi_task"})
+    reward = load_learned_reward(tmp_path)
+    assert (reward.method, reward.members) == (method, MEMBERS)
+    assert reward.about == {"seed": 100, "experiment": "multi_task"}
+    curve = pd.read_csv(tmp_path / "curve.csv")
+    episodes = curve[curve["metric"] == "velocity"]
+    assert episodes["step"].tolist() == [60, 60, 120, 120, 180, 180]
+    assert {"success", "action_norm", "task_reward", "temperature", "curriculum"} <= set(curve["metric"])
+    evaluation = pd.read_csv(tmp_path / "evaluation.csv")
+    assert set(zip(evaluation["task"], evaluation["target"], strict=True)) == set(MEMBERS)
+    gate = json.loads((tmp_path / "gate.json").read_text())
+    assert gate["passed"] == all(member["passed"] for member in gate["members"])
+    samples = pd.read_parquet(tmp_path / "samples.parquet")
+    assert samples.groupby("task").size().tolist() == [180, 180]
+    for task, target in MEMBERS:
+        assert (tmp_path / "policies" / f"{task}-t{target}.safetensors").is_file()
+    diagnostics = pd.read_csv(tmp_path / "diagnostics.csv", keep_default_na=False)
+    assert set(diagnostics["discriminator"]) == {"", "f"} | ({"task"} if method == "mt_csirl_lt" else set())
+    assert not (tmp_path / CHECKPOINT).exists()
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_the_reward_in_the_file_is_the_one_in_memory(method, demonstrations, tmp_path) -> None:
+    trainer = _run(_trainer(method, demonstrations))
+    learn_reward(tmp_path, method, "velocity", demonstrations, 100, irl_settings())
+    reward, sample = load_learned_reward(tmp_path), trainer.replay.sample(50)
+    assert torch.equal(reward(sample), trainer.method.discriminators["f"].network(sample))
+    if method == "mt_csirl_lt":
+        own = Transitions(*(part[1] for part in sample))
+        expected = trainer.method.discriminators["task"].network(sample)[1]
+        torch.testing.assert_close(reward.task_reward("drawer-close", 2)(own), expected)
+
+
+def test_generators_are_paid_by_the_reward_of_this_moment(demonstrations) -> None:
+    trainer = _run(_trainer("mt_csirl", demonstrations), 2)
+    sample = trainer.replay.sample(64)
+    f = trainer.method.discriminators["f"].network
+    alpha = trainer.curriculum.weight()
+    latest = trainer.replay.latest(120).task_reward  # 120 steps, fewer than the window of 256: all count
+    torch.testing.assert_close(alpha, latest.mean(dim=1) / 10)
+    expected = sample.task_reward + alpha[:, None] * f(sample)
+    torch.testing.assert_close(trainer.policy_reward(sample), expected)
+    rowwise = [[f(Transitions(*(part[t, i] for part in sample))).item() for i in range(3)] for t in range(2)]
+    torch.testing.assert_close(f(sample)[:, :3], torch.tensor(rowwise))
+    with torch.no_grad():
+        f.parameters.add_(0.1)  # relabelled when sampled: a changed f counts at once
+    assert not torch.allclose(trainer.policy_reward(sample), expected)
+
+
+def test_warm_up_pays_the_task_reward_alone_and_only_to_methods_that_know_it(demonstrations) -> None:
+    known, unknown = (_trainer(method, demonstrations) for method in ("mt_csirl", "mt_csirl_lt"))
+    for trainer, moves in ((known, False), (unknown, True)):
+        before = trainer.method.discriminators["f"].network.parameters.detach().clone()
+        trainer.iterate()
+        assert torch.equal(before, trainer.method.discriminators["f"].network.parameters) is not moves
+    again = _trainer("mt_csirl", demonstrations)
+    again.replay, sample = known.replay, known.replay.sample(8)
+    assert torch.equal(again.policy_reward(sample), sample.task_reward)
+
+
+def test_scales_and_the_curriculum_switch_enter_the_policy_reward(demonstrations) -> None:
+    trainer = _run(_trainer("mt_csirl", demonstrations, curriculum=False, cs_weight=0.5, task_reward_scale=0.1), 2)
+    sample = trainer.replay.sample(16)
+    f = trainer.method.discriminators["f"].network(sample)
+    torch.testing.assert_close(trainer.policy_reward(sample), 0.1 * sample.task_reward + 0.5 * f)
+
+
+@pytest.mark.parametrize(
+    ("method", "uses_curriculum"), [("mt_airl", False), ("mt_vairl", False), ("mt_csirl_lt", False)]
+)
+def test_methods_without_the_task_reward_never_see_it(method, uses_curriculum, demonstrations) -> None:
+    trainer = _run(_trainer(method, demonstrations), 2)
+    sample = trainer.replay.sample(16)
+    other = sample._replace(task_reward=sample.task_reward + 5.0)
+    assert torch.equal(trainer.policy_reward(sample), trainer.policy_reward(other))
+    assert trainer.alpha().tolist() == [1.0, 1.0]
+    batch = trainer._batch(16)
+    changed = batch._replace(generator=batch.generator._replace(task_reward=batch.generator.task_reward + 5.0))
+    for discriminator in trainer.method.discriminators.values():
+        assert torch.equal(discriminator.logits(batch)[1], discriminator.logits(changed)[1])
+
+
+def _same(first: IrlTrainer, second: IrlTrainer) -> bool:
+    ours, theirs = first.state(), second.state()
+    return ours.keys() == theirs.keys() and all(torch.equal(ours[name], theirs[name]) for name in ours)
+
+
+def test_one_task_printed_order_and_batched_program_are_the_same(demonstrations) -> None:
+    one = demonstrations[:1]
+    first, second = (_run(_trainer("mt_csirl", one, schedule=s)) for s in ("as_printed", "batched"))
+    assert _same(first, second)
+    assert not _same(first, _run(_trainer("mt_csirl", one, cs_weight=0.5)))
+
+
+def test_per_task_rewards_do_not_depend_on_the_schedule(demonstrations) -> None:
+    first, second = (
+        _run(_trainer("mt_csirl_lt", demonstrations, schedule=s, warm_up_iterations=0, iterations=1))
+        for s in ("as_printed", "batched")
+    )
+    ours, theirs = (one.method.discriminators["task"].network.parameters for one in (first, second))
+    assert torch.equal(ours, theirs)
+    ours, theirs = (one.method.discriminators["f"].network.parameters for one in (first, second))
+    assert not torch.equal(ours, theirs)  # a shared f took T times the steps
+
+
+def test_as_printed_pays_each_generator_by_f_after_its_own_turn(demonstrations) -> None:
+    trainer = _run(_trainer("mt_csirl", demonstrations, schedule="as_printed"))
+    sample = trainer.replay.sample(16)
+    paying, final = trainer._paying["f"](sample), trainer.method.discriminators["f"].network(sample)
+    torch.testing.assert_close(paying[1], final[1])  # the last task's turn leaves the final f
+    assert not torch.allclose(paying[0], final[0])
+
+
+def test_log_pi_is_clamped_and_of_the_current_policy(demonstrations) -> None:
+    trainer = _run(_trainer("mt_csirl", demonstrations), 1)
+    batch = trainer._batch(64)
+    expected = trainer.sac.log_prob(batch.generator.observation, batch.generator.action).clamp(-10, 10)
+    torch.testing.assert_close(batch.generator_log_pi, expected)
+    assert batch.expert_log_pi.abs().max() <= 10
+
+
+def test_generator_side_comes_from_the_last_iterations_only(demonstrations) -> None:
+    trainer = _run(_trainer("mt_csirl", demonstrations, generator_replay=1), 2)
+    latest = {tuple(row) for row in trainer.replay.latest(60).observation[0].tolist()}
+    sampled = {tuple(row) for row in trainer._batch(200).generator.observation[0].tolist()}
+    assert sampled <= latest
+
+
+def test_temperature_in_the_logit_is_a_choice(demonstrations) -> None:
+    for choice, expected in (("generator", 0.25), ("as_printed", 1.0)):
+        trainer = _run(_trainer("mt_csirl", demonstrations, logit_temperature=choice, temperature=0.25), 1)
+        assert trainer._batch(4).temperature.tolist() == [[pytest.approx(expected)]] * 2
+
+
+def test_same_seed_same_bytes_and_resume_ends_with_them(demonstrations, tmp_path, monkeypatch) -> None:
+    settings = irl_settings(warm_up_iterations=1, iterations=4)
+    whole, stopped = tmp_path / "whole", tmp_path / "stopped"
+    learn_reward(whole, "mt_vairl_gp", "velocity", demonstrations, 100, settings)
+
+    iterate, count = IrlTrainer.iterate, [0]
+
+    def killed_after_three(self) -> None:
+        if count[0] == 3:
+            raise KeyboardInterrupt
+        count[0] += 1
+        iterate(self)
+
+    monkeypatch.setattr(IrlTrainer, "iterate", killed_after_three)
+    with pytest.raises(KeyboardInterrupt):
+        learn_reward(stopped, "mt_vairl_gp", "velocity", demonstrations, 100, settings)
+    assert (stopped / CHECKPOINT).is_file()
+    count[0] = 1  # two more iterations are left and no more than two may be made
+    learn_reward(stopped, "mt_vairl_gp", "velocity", demonstrations, 100, settings)
+    for name in FILES:
+        assert checksum(whole / name) == checksum(stopped / name), name
+
+
+def test_a_checkpoint_of_other_settings_or_a_broken_one_is_not_taken_up(demonstrations, tmp_path, monkeypatch) -> None:
+    whole = tmp_path / "whole"
+    learn_reward(whole, "mt_csirl", "velocity", demonstrations, 100, irl_settings())
+    other = _run(_trainer("mt_csirl", demonstrations), 1)
+    from mtcsirl.irl import run
+
+    for name, write in {
+        "other": lambda path: run.write_tensors(path, other.state() | run._rows_to_tensors(other, "another run")),
+        "broken": lambda path: path.write_bytes(b"half a file"),
+    }.items():
+        folder = tmp_path / name
+        folder.mkdir()
+        write(folder / CHECKPOINT)
+        learn_reward(folder, "mt_csirl", "velocity", demonstrations, 100, irl_settings())
+        assert all(checksum(whole / file) == checksum(folder / file) for file in FILES)
+
+
+def test_unknown_names_are_one_clear_line(demonstrations, tmp_path) -> None:
+    with pytest.raises(UserError, match="method: unknown 'gail'"):
+        learn_reward(tmp_path, "gail", "velocity", demonstrations, 100, irl_settings())
+    with pytest.raises(UserError, match="cs_reward: unknown 'grace'"):
+        learn_reward(tmp_path, "mt_csirl", "grace", demonstrations, 100, irl_settings())
+
+
+def test_two_rewards_of_one_task_do_not_start_equal() -> None:
+    method = METHODS["mt_csirl_lt"](Setup(irl=irl_settings().irl, tasks=1, seed=100))
+    task, f = (method.discriminators[name].network.parameters for name in ("task", "f"))
+    assert not torch.allclose(task, f)
+
+
+class _Counting:
+    """Two environments whose observation is the number of steps since the reset."""
+
+    def reset(self) -> np.ndarray:
+        self.now = 0.0
+        return np.zeros((2, 1), dtype=np.float32)
+
+    def step(self, action: np.ndarray) -> Outcome:
+        self.now += 1.0
+        flags = np.array([self.now == 2.0, False])
+        return Outcome(np.full((2, 1), self.now, dtype=np.float32), action[:, 0], flags, ~flags)
+
+    def close(self) -> None: ...
+
+
+def test_rollouts_reset_every_episode_and_hand_on_every_step() -> None:
+    seen = []
+    success = collect(_Counting(), lambda o: 10.0 + o, 5, 3, lambda *step: seen.append(step))
+    assert success.tolist() == [[False, True, False, False, True], [False] * 5]
+    assert [float(observation[0, 0]) for observation, _, _ in seen] == [0, 1, 2, 0, 1]
+    assert [float(action[1, 0]) for _, action, _ in seen] == [10, 11, 12, 10, 11]
+    assert [float(outcome.next_observation[0, 0]) for _, _, outcome in seen] == [1, 2, 3, 1, 2]
