@@ -68,6 +68,11 @@ def read_text(path: Path | str) -> str:
     return _read(path, lambda p: p.read_text(encoding="utf-8"), "text file")
 
 
+def read_bytes(path: Path | str) -> bytes:
+    """Read a binary file."""
+    return _read(path, lambda p: p.read_bytes(), "file")
+
+
 def write_json(path: Path | str, data: Any) -> None:
     """Write JSON with sorted keys, so equal data gives equal bytes."""
     write_text(path, json.dumps(data, indent=2, sort_keys=True, allow_nan=False) + "\n")

@@ -10,6 +10,7 @@ from matplotlib.colors import to_rgb
 from mtcsirl.figures.style import (
     LOOKS,
     TARGET_COLOUR,
+    caption_of,
     figure_bytes,
     look,
     new_figure,
@@ -52,6 +53,12 @@ def test_equal_figures_give_equal_bytes(kind):
         return figure_bytes(figure, kind)
 
     assert file() == file()
+
+
+def test_file_carries_its_caption():
+    caption = "Velocity: r = 0.18 [–0.1, 0.4], n = 5 seeds"
+    assert caption_of(figure_bytes(new_figure(1, 1), "png", caption)) == caption
+    assert caption_of(figure_bytes(new_figure(1, 1), "png")) == ""
 
 
 def test_reader_settings_have_no_say():

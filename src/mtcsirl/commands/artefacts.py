@@ -63,11 +63,11 @@ def _figure(parsed: argparse.Namespace) -> None:
     frames = {what: read(study, settings.results, partial=parsed.partial) for what, read in readers.items()}
     spec = figure_spec(name)
     data = FigureData(settings=settings, **frames)
-    figure = spec.draw(data)
+    figure, caption = spec.draw(data), spec.caption(data)
     folder = parsed.output or Path(settings.figures)
-    write_bytes(folder / f"{name}.pdf", figure_bytes(figure, "pdf"))
-    write_bytes(folder / f"{name}.png", figure_bytes(figure, "png"))
-    print(f"{spec.title}. {spec.caption(data)}")
+    write_bytes(folder / f"{name}.pdf", figure_bytes(figure, "pdf", caption))
+    write_bytes(folder / f"{name}.png", figure_bytes(figure, "png", caption))
+    print(f"{spec.title}. {caption}")
 
 
 def _claims(parsed: argparse.Namespace) -> None:
@@ -75,4 +75,11 @@ def _claims(parsed: argparse.Namespace) -> None:
 
 
 def _report(parsed: argparse.Namespace) -> None:
-    raise UserError("report: not built yet")
+    from mtcsirl.report.collect import collect
+    from mtcsirl.report.page import build_report
+    from mtcsirl.storage import write_text
+
+    settings = study_settings(parsed)
+    page = (parsed.output or Path(settings.results) / "report") / "index.html"
+    write_text(page, build_report(collect(settings, page, partial=parsed.partial)))
+    print(page)

@@ -9,6 +9,7 @@ from io import BytesIO
 from typing import Literal, NamedTuple, ParamSpec
 
 import matplotlib
+import PIL.Image
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
@@ -103,14 +104,23 @@ def new_figure(width: float, height: float) -> Figure:
     return figure
 
 
-def figure_bytes(figure: Figure, kind: Literal["png", "pdf"]) -> bytes:
-    """The figure as a PNG or PDF file; equal figures give equal bytes (no date, no program name)."""
-    stamp = {"pdf": {"CreationDate": None, "Producer": None}, "png": {"Software": None}}[kind]
+def figure_bytes(figure: Figure, kind: Literal["png", "pdf"], caption: str = "") -> bytes:
+    """The figure as a PNG or PDF file that carries its caption; equal figures give equal bytes (no date, no program)."""
+    stamp = {
+        "pdf": {"CreationDate": None, "Producer": None, "Subject": caption},
+        "png": {"Software": None, "Description": caption},
+    }[kind]
     buffer = BytesIO()
     logging.getLogger("fontTools").setLevel(logging.ERROR)  # it remarks on the font's own time stamp
     with paper_style():
         figure.savefig(buffer, format=kind, metadata=stamp)
     return buffer.getvalue()
+
+
+def caption_of(png: bytes) -> str:
+    """The caption that :func:`figure_bytes` put into a PNG file; empty if there is none."""
+    with PIL.Image.open(BytesIO(png)) as image:
+        return str(image.info.get("Description", ""))
 
 
 def add_notes(figure: Figure, notes: Sequence[str]) -> None:
