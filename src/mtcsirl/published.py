@@ -1,5 +1,6 @@
 """The paper's own numbers, in this suite's units: m/s, |a|_1, success as a share."""
 
+from collections.abc import Iterable
 from functools import cache
 from importlib import resources
 from typing import Any
@@ -10,9 +11,16 @@ import yaml
 from mtcsirl.analysis.statistics import Summary
 from mtcsirl.errors import UserError
 
+PAPER_ORDER = ("action_norm", "velocity")
 RATIO_TABLES = {"action_norm": "table_1", "velocity": "table_3"}
 UNKNOWN = Summary(np.nan, np.nan, 0)
 """What the paper does not print."""
+
+
+def in_paper_order(cs_rewards: Iterable[str]) -> tuple[str, ...]:
+    """cs-rewards as the paper orders its columns and panels, any others behind them."""
+    given = tuple(cs_rewards)
+    return (*(cs for cs in PAPER_ORDER if cs in given), *(cs for cs in given if cs not in PAPER_ORDER))
 
 
 class Published:

@@ -160,8 +160,8 @@ def _status(agent: dict[str, Any], own: pd.DataFrame, folder: Path) -> str:
     gate = folder / "gate.json"
     if gate.is_file():
         verdict = storage.read_json(gate)
-        verdict = verdict.get("members", {}).get(f"{agent['task']}-t{agent['target']}", verdict)
-        return OK if verdict.get("passed") else BELOW_GATE
+        members = {(m["task"], m["target"]): m for m in verdict.get("members", [])}
+        return OK if members.get((agent["task"], agent["target"]), verdict)["passed"] else BELOW_GATE
     return OK
 
 

@@ -188,12 +188,14 @@ def cluster_bootstrap(
 
     ``clusters`` are label vectors [rows], for example (seed, episode): seeds are drawn with replacement, then within
     each drawn seed its episodes; rows of an episode stay together since they are not independent. n = clusters of the
-    innermost level.
+    innermost level; one cluster has no interval.
     """
     labels = np.column_stack([np.unique(np.asarray(level), return_inverse=True)[1] for level in clusters])
     rows = np.arange(len(labels))
     n = len(np.unique(labels, axis=0))
     tree = _tree(rows, labels)
+    if n < 2:
+        return Estimate(float(statistic(rows)), np.nan, np.nan, n)
     draws = [statistic(np.concatenate(_draw(tree, generator))) for _ in range(resamples)]
     return Estimate(float(statistic(rows)), *_percentiles(draws, confidence), n)
 
@@ -244,6 +246,8 @@ def _superiority(x: Array, y: Array) -> float:
 
 
 def _percentiles(draws: Sequence[float], confidence: float) -> Interval:
+    if np.isnan(draws).all():
+        return UNKNOWN
     low, high = np.nanpercentile(draws, [50 * (1 - confidence), 50 * (1 + confidence)])
     return Interval(float(low), float(high))
 

@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 
 from mtcsirl.analysis.rows import BELOW_GATE, DUPLICATED, FOREIGN, MISSING, matrix, select
-from mtcsirl.analysis.statistics import Interval, Summary, prediction_interval, summarise, t_interval
+from mtcsirl.analysis.statistics import UNKNOWN, Interval, Summary, prediction_interval, summarise, t_interval
 
 DASH = "–"
 MARKS = {"below": "†", "missing": "‡", "doubtful": "§"}
@@ -80,7 +80,8 @@ class Cell:
 def make_cell(rows: pd.DataFrame, metric: str, paper: Summary, scale: float = 1.0) -> Cell:
     """The cell of one agent over its seeds and tasks: ``metric`` / ``scale`` of its evaluation ``rows``.
 
-    Episodes were averaged per run; here tasks are averaged per seed, then seeds. ``paper`` is in units of the result.
+    Episodes were averaged per run; here tasks are averaged per seed, then seeds. ``paper`` is in units of the result; a
+    printed spread of 0 predicts nothing.
     """
     chosen = select(rows, metric=metric, policy="stochastic")
     ours = summarise(per_seed(chosen) / scale)
@@ -90,7 +91,7 @@ def make_cell(rows: pd.DataFrame, metric: str, paper: Summary, scale: float = 1.
         ours=ours,
         interval=t_interval(ours),
         paper=paper,
-        prediction=prediction_interval(paper, ours.n),
+        prediction=prediction_interval(paper, ours.n) if paper.std > 0 else UNKNOWN,
         deterministic=summarise(greedy).mean,
         expected=chosen["seed"].nunique(),
         below=int((status == BELOW_GATE).sum()),

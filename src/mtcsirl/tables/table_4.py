@@ -3,7 +3,7 @@
 import pandas as pd
 
 from mtcsirl.analysis.rows import select
-from mtcsirl.published import Published, load_published
+from mtcsirl.published import Published, in_paper_order, load_published
 from mtcsirl.settings import Settings
 from mtcsirl.tables.cells import Cell, make_cell
 from mtcsirl.tables.table import Column, Entry, Table, result_table
@@ -30,7 +30,7 @@ def table_4(rows: pd.DataFrame, settings: Settings, published: Published | None 
     """Build the table from ``evaluation_rows``."""
     published = published or load_published()
     columns, kinds = [], []
-    for cs in settings.cs_rewards if "mt_csirl_lt" in settings.methods else ():
+    for cs in in_paper_order(settings.cs_rewards) if "mt_csirl_lt" in settings.methods else ():
         name = cs.replace("_", " ")
         columns += [Column(f"{name} ratio", name), Column("success rate (%)", name)]
         kinds += [(cs, cs, 2, 1.0), (cs, "success", 1, 100.0)]
