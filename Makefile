@@ -1,0 +1,50 @@
+# Everything into .venv, from nothing but Python and git.
+PYTHON ?= python3
+CORES ?= 2
+VENV := .venv
+BIN := $(VENV)/bin
+EXTRAS := dev,export,tensorboard,video
+SMOKE := --configfile config/smoke.yaml
+# the tools find each other, and every job finds `mtcsirl`, without an activated environment
+export PATH := $(CURDIR)/$(BIN):$(PATH)
+
+.PHONY: help setup replicate smoke test lint bench constraints
+
+help:  ## print this list
+	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
+
+setup: $(VENV)/.ready  ## the virtual environment with the exact versions of constraints.txt
+
+$(VENV)/.ready: pyproject.toml constraints.txt
+	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "Python 3.11 or newer is needed: make PYTHON=python3.11 ...")'
+	$(PYTHON) -m venv $(VENV) || { echo "no venv: install Debian's python3-venv"; exit 1; }
+	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable ".[$(EXTRAS)]"
+	touch $@
+
+replicate: setup  ## the whole paper at desk scale: every table, figure, verdict and the report
+	snakemake --cores $(CORES)
+
+smoke: setup  ## the same in minutes, too small to mean anything
+	snakemake --cores $(CORES) $(SMOKE)
+
+test: setup  ## all tests
+	pytest
+
+lint: setup  ## formatting, lint and types, all of which must be clean
+	ruff check
+	ruff format --check
+	mypy src
+	snakefmt --check Snakefile workflow
+
+bench: setup  ## measured ratios against stable-baselines3 and stock Meta-World
+	python -m benchmarks
+
+constraints:  ## renew constraints.txt: the newest versions that pyproject.toml allows
+	rm -rf build/constraints
+	$(PYTHON) -m venv build/constraints
+	build/constraints/bin/python -m pip install --quiet --editable ".[$(EXTRAS)]"
+	{ echo "# Exact versions of every dependency, from \`make constraints\`; torch without hash or build: these differ by platform."; \
+	  build/constraints/bin/python -m pip list --format=freeze --exclude-editable --exclude pip --exclude setuptools \
+	  | grep -viE '^(nvidia|cuda|triton)' | sed 's/+.*//' | LC_ALL=C sort -f; } > build/constraints.txt
+	mv build/constraints.txt constraints.txt
+	rm -rf build/constraints
