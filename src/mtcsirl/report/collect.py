@@ -1,0 +1,207 @@
+"""Reads what the DAG left and turns it into the content of the start page."""
+
+import os
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from mtcsirl import storage
+from mtcsirl.design import ARTEFACTS, design
+from mtcsirl.errors import UserError
+from mtcsirl.figures import figure_spec
+from mtcsirl.figures.style import caption_of
+from mtcsirl.outputs import OUTPUTS
+from mtcsirl.report.content import (
+    Claim,
+    DeviationLine,
+    FigureView,
+    GateLine,
+    ReportData,
+    StageCost,
+    TableView,
+    WhatWasRun,
+)
+from mtcsirl.report.markdown import parse_table
+from mtcsirl.settings import Settings
+from mtcsirl.settings.template import deviations
+from mtcsirl.study import Run, Study
+
+SUMMARY_TARGETS = (
+    ("claims", "the verdicts on all claims"),
+    ("report", "this page"),
+    ("all", "everything"),
+)
+
+
+def collect(settings: Settings, page: Path, *, partial: bool = False) -> ReportData:
+    """The content of the page that will lie at ``page``; links are relative to it.
+
+    Raises UserError when something is missing and ``partial`` is false.
+    """
+    study = design(settings)
+    results = Path(settings.results)
+    missing = [(name, _title(name)) for name in ARTEFACTS if not _picture_or_table(name, settings).is_file()]
+    if missing and not partial:
+        path = _picture_or_table(missing[0][0], settings)
+        raise UserError(f"{path}: not there; make it with `snakemake {missing[0][0]}`, or ask for --partial results")
+    there = [name for name in ARTEFACTS if name not in dict(missing)]
+    return ReportData(
+        run=_what_was_run(settings, study),
+        claims=_claims(results / "claims" / "claims.json", partial),
+        tables=tuple(_table(name, settings, page) for name in there if name.startswith("table_")),
+        figures=tuple(_figure(name, settings, page) for name in there if name.startswith("figure_")),
+        gates=_gates(study, results),
+        deviations=tuple(_deviation_lines(settings)),
+        targets=(*((name, _title(name)) for name in ARTEFACTS), *SUMMARY_TARGETS),
+        missing=tuple(missing),
+        links=_links(page, (("verdicts as data", results / "claims" / "claims.json"),)),
+    )
+
+
+def _title(name: str) -> str:
+    if name.startswith("figure_"):
+        return figure_spec(name).title
+    return TABLE_TITLES[name]
+
+
+TABLE_TITLES = {
+    "table_1": "Action norm: learned on several targets, tried on new targets and other tasks",
+    "table_2": "Unseen tasks: all methods",
+    "table_3": "Velocity: learned on several targets, tried on new targets and other tasks",
+    "table_4": "MT-CSIRL+LT: both rewards learned, agents from scratch",
+    "table_5": "Hyperparameters of SAC",
+}
+
+
+def _picture_or_table(name: str, settings: Settings) -> Path:
+    if name.startswith("figure_"):
+        return Path(settings.figures) / f"{name}.png"
+    return Path(settings.results) / "tables" / f"{name}.md"
+
+
+def _table(name: str, settings: Settings, page: Path) -> TableView:
+    path = _picture_or_table(name, settings)
+    table = parse_table(storage.read_text(path), path)
+    files = ((ending.upper(), path.with_suffix(f".{ending}")) for ending in ("csv", "md", "tex"))
+    return TableView(name, table.caption, table.head, table.rows, table.notes, _links(page, tuple(files)))
+
+
+def _figure(name: str, settings: Settings, page: Path) -> FigureView:
+    path = _picture_or_table(name, settings)
+    png = storage.read_bytes(path)
+    links = _links(page, (("PDF", path.with_suffix(".pdf")), ("PNG", path)))
+    return FigureView(name, _title(name), caption_of(png), png, links)
+
+
+def _links(page: Path, files: tuple[tuple[str, Path], ...]) -> tuple[tuple[str, str], ...]:
+    """Addresses relative to the page of those files that are there."""
+    return tuple((text, Path(os.path.relpath(file, page.parent)).as_posix()) for text, file in files if file.is_file())
+
+
+def _what_was_run(settings: Settings, study: Study) -> WhatWasRun:
+    provenance = {run: found for run in study if (found := _json(run, settings, "provenance.json"))}
+    return WhatWasRun(
+        scale=settings.scale,
+        seeds=settings.seeds,
+        commits=_distinct(found["commit"] for found in provenance.values()),
+        machines=_distinct(_machine(found["machine"]) for found in provenance.values()),
+        versions=next((found["versions"] for found in provenance.values()), {}),
+        stages=tuple(_stage_cost(stage, study, provenance) for stage in OUTPUTS),
+    )
+
+
+def _json(run: Run, settings: Settings, name: str) -> dict[str, Any] | None:
+    path = Path(settings.results) / run.folder / name
+    return storage.read_json(path) if path.is_file() else None
+
+
+def _machine(found: dict[str, Any]) -> str:
+    return f"{found['processor']}, {found['cores']} cores, {found['system']}, Python {found['python']}"
+
+
+def _stage_cost(stage: str, study: Study, provenance: dict[Run, dict[str, Any]]) -> StageCost:
+    costs = [found["cost"] for run, found in provenance.items() if run.stage == stage]
+    return StageCost(
+        stage=stage,
+        done=len(costs),
+        planned=study.jobs().get(stage, 0),
+        cpu_hours=sum(cost["cpu_seconds"] for cost in costs) / 3600,
+        peak_memory_mib=max((cost["peak_memory_mib"] for cost in costs), default=0.0),
+    )
+
+
+def _distinct(items: Iterator[str]) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(items))
+
+
+def _claims(path: Path, partial: bool) -> tuple[Claim, ...]:
+    if partial and not path.is_file():
+        return ()
+    return tuple(_claim(found) for found in storage.read_json(path)["claims"])
+
+
+def _claim(found: dict[str, Any]) -> Claim:
+    criteria = tuple(
+        (str(unit["unit"]), str(unit["paper"]), str(unit["ours"]), str(unit["answer"])) for unit in found["units"]
+    )
+    return Claim(found["name"], found["text"], found["locus"], found["verdict"], found.get("criterion", ""), criteria)
+
+
+def _gates(study: Study, results: Path) -> tuple[GateLine, ...]:
+    """One line per kind of agent, task and cs-reward; an IRL run has one gate per generator."""
+    groups: dict[tuple[str, str, str], list[dict[str, Any]]] = {}
+    for run in study:
+        path = results / run.folder / "gate.json"
+        if "gate.json" in OUTPUTS[run.stage] and path.is_file():
+            for task, gate in _members(run, storage.read_json(path)):
+                key = (_agent_name(run), task, _cs_reward(run))
+                groups.setdefault(key, []).append(gate)
+    return tuple(_gate_line(key, gates) for key, gates in groups.items())
+
+
+def _members(run: Run, gate: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
+    if "members" in gate:
+        for verdict in gate["members"]:
+            yield verdict["task"], verdict
+    else:
+        yield run.task, gate  # type: ignore[union-attr]
+
+
+AGENT_NAMES = {"train_expert": "expert", "train_sac": "SAC", "learn_reward": "generator", "transfer": "transfer agent"}
+
+
+def _agent_name(run: Run) -> str:
+    """As in ``transfer agent, multi_task, mt_csirl``."""
+    irl = getattr(run, "irl", run)
+    parts = [AGENT_NAMES[run.stage], *(getattr(irl, name, "") for name in ("experiment", "method"))]
+    return ", ".join(part.replace("_", " ") for part in parts if part)
+
+
+def _cs_reward(run: Run) -> str:
+    return str(getattr(getattr(run, "irl", run), "cs_reward", ""))
+
+
+def _gate_line(key: tuple[str, str, str], gates: list[dict[str, Any]]) -> GateLine:
+    metrics = [gate["metric"] for gate in gates if gate.get("metric") is not None]
+    return GateLine(
+        *key,
+        passed=sum(gate["passed"] for gate in gates),
+        agents=len(gates),
+        success=sum(gate["success"] for gate in gates) / len(gates),
+        metric=sum(metrics) / len(metrics) if metrics else None,
+    )
+
+
+def _deviation_lines(settings: Settings) -> Iterator[DeviationLine]:
+    for found in deviations(settings):
+        unit = f" {found.unit}" if found.unit else ""
+        yield DeviationLine(found.key, f"{_plain(found.ours)}{unit}", _plain(found.paper), found.text)
+
+
+def _plain(value: Any) -> str:
+    """A settings value in words: lists and mappings without their brackets."""
+    if isinstance(value, dict):
+        return ", ".join(f"{name}: {_plain(item)}" for name, item in value.items())
+    if isinstance(value, tuple | list):
+        return ", ".join(map(_plain, value))
+    return f"{value:,}" if isinstance(value, int) and not isinstance(value, bool) else str(value)

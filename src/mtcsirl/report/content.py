@@ -1,0 +1,100 @@
+"""What the start page shows, as plain data: no file is read and none is written here."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class StageCost:
+    """The runs of one stage: how many there are of how many, and what they cost."""
+
+    stage: str
+    done: int
+    planned: int
+    cpu_hours: float
+    peak_memory_mib: float
+
+
+@dataclass(frozen=True)
+class WhatWasRun:
+    """Scale, seeds, code and machines; more than one commit or machine is a reason to look twice."""
+
+    scale: str
+    seeds: tuple[int, ...]
+    commits: tuple[str, ...]
+    machines: tuple[str, ...]
+    versions: dict[str, str]
+    stages: tuple[StageCost, ...]
+
+
+@dataclass(frozen=True)
+class Claim:
+    """One claim with its verdict; ``criteria`` are (what was asked, paper, ours, answer)."""
+
+    name: str
+    text: str
+    locus: str
+    verdict: str
+    reason: str = ""
+    criteria: tuple[tuple[str, str, str, str], ...] = ()
+
+
+@dataclass(frozen=True)
+class TableView:
+    """A table as printed: ``rows`` are (label, cells); ``links`` are (text, relative address)."""
+
+    name: str
+    caption: str
+    head: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    notes: tuple[str, ...]
+    links: tuple[tuple[str, str], ...] = ()
+
+
+@dataclass(frozen=True)
+class FigureView:
+    """A figure: its PNG file, caption and links."""
+
+    name: str
+    title: str
+    caption: str
+    png: bytes
+    links: tuple[tuple[str, str], ...] = ()
+
+
+@dataclass(frozen=True)
+class GateLine:
+    """Agents of one kind, task and cs-reward: how many passed their gate, their mean success and metric."""
+
+    gate: str
+    task: str
+    cs_reward: str
+    passed: int
+    agents: int
+    success: float
+    metric: float | None
+
+
+@dataclass(frozen=True)
+class DeviationLine:
+    """A setting that differs from the paper's."""
+
+    key: str
+    ours: str
+    paper: str
+    text: str
+
+
+@dataclass(frozen=True)
+class ReportData:
+    """Everything on the page. ``missing`` maps an artefact that is not there to its title."""
+
+    run: WhatWasRun
+    claims: tuple[Claim, ...]
+    tables: tuple[TableView, ...]
+    figures: tuple[FigureView, ...]
+    gates: tuple[GateLine, ...]
+    deviations: tuple[DeviationLine, ...]
+    targets: tuple[tuple[str, str], ...]
+    """(target, what it makes): how to rerun each item."""
+    missing: tuple[tuple[str, str], ...] = ()
+    links: tuple[tuple[str, str], ...] = ()

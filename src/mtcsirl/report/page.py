@@ -1,0 +1,69 @@
+"""The start page as one HTML file: styles and pictures inside, no script, nothing from a network."""
+
+from base64 import b64encode
+from importlib import resources
+
+from jinja2 import Environment, FunctionLoader, StrictUndefined
+from markupsafe import Markup
+
+from mtcsirl.report.content import FigureView, ReportData
+
+VERDICTS = {
+    "reproduced": "good",
+    "partially": "partly",
+    "not reproduced": "bad",
+    "inconclusive": "open",
+    "precondition not met": "open",
+    "not run": "none",
+}
+"""Verdict and its style; the words stand beside the colour."""
+SECONDARY = ("95 % t-interval", "paper")
+"""Labels of the lines that belong to the line above them."""
+CONFIGS = {"smoke": "--configfile config/smoke.yaml ", "paper": "--configfile config/paper.yaml "}
+
+
+def build_report(data: ReportData) -> str:
+    """The page; equal data gives equal text. Every text is escaped."""
+    environment = Environment(
+        loader=FunctionLoader(_file), autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+    )
+    environment.filters |= {"picture": _picture, "strong": _strong, "number": _number, "title": _title}
+    return environment.get_template("page.html").render(
+        data=data,
+        css=Markup(_file("page.css")),
+        verdict_style=VERDICTS,
+        verdict_counts=_verdict_counts(data),
+        secondary=SECONDARY,
+        command=f"snakemake --cores 2 {CONFIGS.get(data.run.scale, '')}",
+    )
+
+
+def _file(name: str) -> str:
+    return resources.files("mtcsirl.report").joinpath(name).read_text(encoding="utf-8")
+
+
+def _picture(figure: FigureView) -> str:
+    """The PNG as a data address, so that the page can be moved and mailed."""
+    return "data:image/png;base64," + b64encode(figure.png).decode("ascii")
+
+
+def _strong(text: str) -> Markup:
+    """``**x**`` as strong text, everything else escaped."""
+    if text.startswith("**") and text.endswith("**") and len(text) > 4:
+        return Markup("<strong>{}</strong>").format(text[2:-2])
+    return Markup("{}").format(text)
+
+
+def _number(value: float | None, digits: int = 2) -> str:
+    return "–" if value is None or value != value else f"{value:.{digits}f}"
+
+
+def _title(name: str) -> str:
+    """As in "Table 2"; supplementary figures are "Figure S1"."""
+    kind, _, number = name.partition("_")
+    return f"{kind.capitalize()} {number.upper()}" if number else kind.capitalize()
+
+
+def _verdict_counts(data: ReportData) -> list[tuple[str, int]]:
+    verdicts = [claim.verdict for claim in data.claims]
+    return [(verdict, verdicts.count(verdict)) for verdict in VERDICTS if verdict in verdicts]

@@ -1,0 +1,83 @@
+"""A made-up page: every section filled, awkward characters included."""
+
+from dataclasses import replace
+from functools import cache
+
+from mtcsirl.design import ARTEFACTS
+from mtcsirl.figures.style import figure_bytes, new_figure
+from mtcsirl.report.content import (
+    Claim,
+    DeviationLine,
+    FigureView,
+    GateLine,
+    ReportData,
+    StageCost,
+    TableView,
+    WhatWasRun,
+)
+
+FIGURES = [name for name in ARTEFACTS if name.startswith("figure_")]
+VERDICTS = ("reproduced", "partially", "not reproduced", "inconclusive", "precondition not met", "not run")
+TASKS = ("reach-wall", "button-press-topdown-wall", "drawer-close", "push-back", "coffee-button")
+
+
+def made_up_report(scale: str = "desk", **changes) -> ReportData:
+    data = ReportData(
+        run=WhatWasRun(
+            scale=scale,
+            seeds=(0, 1, 2, 3, 4),
+            commits=("0123456789abcdef0123456789abcdef01234567",),
+            machines=("Some Processor 9000 @ 2.50GHz, 2 cores, Linux-6.1, Python 3.11.7",),
+            versions={"metaworld": "3.1.1", "torch": "2.13.0"},
+            stages=(
+                StageCost("train_expert", 120, 130, 8.5, 612.0),
+                StageCost("train_sac", 50, 50, 3.25, 590.4),
+            ),
+        ),
+        claims=tuple(
+            Claim(
+                f"C{number + 1}",
+                "Experts trained on task and ground-truth cs-reward reach both targets with <full> success.",
+                "Table 2, row Expert",
+                VERDICTS[number % len(VERDICTS)],
+                "mean distance to the target at most 15 % & mean success at least 90 %",
+                (("velocity, reach-wall", "0.81 ± 0.02", "0.79 [0.75, 0.83]", "met"),),
+            )
+            for number in range(12)
+        ),
+        tables=(
+            TableView(
+                "table_1",
+                "Ratio to the target; rows: where the reward was learned.",
+                ("learned on", *TASKS),
+                tuple(row for task in TASKS for row in _rows(task)),
+                ("scale desk; 5 seeds (0, 1, 2, 3, 4)", "† agents below their gate; they count in the mean"),
+                (("CSV", "../tables/table_1.csv"),),
+            ),
+        ),
+        figures=tuple(_figure(name) for name in FIGURES),
+        gates=(
+            GateLine("expert", "reach-wall", "velocity", 5, 5, 1.0, 0.79),
+            GateLine("SAC", "push-back", "", 0, 5, 0.4, None),
+            GateLine("transfer agent, multi task, mt csirl", "drawer-close", "action_norm", 3, 5, 0.92, 2.7),
+        ),
+        deviations=(
+            DeviationLine("sac.minibatch", "128 transitions", "500", "transitions per gradient step"),
+            DeviationLine("irl.schedule", "batched", "as_printed", "loop over tasks as printed, or one tensor program"),
+        ),
+        targets=tuple((name, f"makes {name}") for name in (*ARTEFACTS, "claims", "all")),
+    )
+    return replace(data, **changes)
+
+
+def _rows(task):
+    yield (task, *("**0.91 ± 0.03, n=5**" if task == other else "0.52 ± 0.10, n=5 †1" for other in TASKS))
+    yield ("95 % t-interval", *("[0.87, 0.95]" for _ in TASKS))
+    yield ("paper", *("0.91" for _ in TASKS))
+
+
+@cache
+def _figure(name):
+    figure = new_figure(3, 1.5)
+    figure.subplots().plot([0, 1], [0, 1])
+    return FigureView(name, f"what {name} shows", "Mean and 95 % t-interval, n = 5 seeds.", figure_bytes(figure, "png"))

@@ -1,0 +1,152 @@
+"""The start page as text and in a browser."""
+
+import itertools
+import re
+from dataclasses import replace
+from html.parser import HTMLParser
+
+import pytest
+
+from mtcsirl.report.page import build_report
+from tests.report.browser import CHROMIUM, inspect
+from tests.report.made_up import FIGURES, made_up_report
+
+SECTIONS = ["run", "claims", "tables", "figures", "gates", "deviations", "rerun"]
+needs_chromium = pytest.mark.skipif(CHROMIUM is None, reason="chromium is not installed: apt-get install chromium")
+
+
+class Elements(HTMLParser):
+    """All start tags with their attributes; refuses tags that are closed in the wrong order."""
+
+    VOID = ("meta", "link", "img", "br")
+
+    def __init__(self, page: str) -> None:
+        super().__init__()
+        self.found: list[tuple[str, dict[str, str | None]]] = []
+        self.open: list[str] = []
+        self.feed(page)
+
+    def handle_starttag(self, tag, attrs):
+        self.found.append((tag, dict(attrs)))
+        if tag not in self.VOID:
+            self.open.append(tag)
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def attributes(self, tag, name):
+        return [attributes[name] for found, attributes in self.found if found == tag and name in attributes]
+
+
+@pytest.fixture(scope="module")
+def page():
+    return build_report(made_up_report())
+
+
+@pytest.fixture(scope="module", params=[1200, 360], ids=["wide", "narrow"])
+def seen(request, page, tmp_path_factory):
+    return inspect(page, request.param, tmp_path_factory.mktemp("chromium"))
+
+
+def test_answers_in_order(page):
+    ids = [attributes["id"] for tag, attributes in Elements(page).found if tag == "section"]
+    assert ids == SECTIONS
+    assert [
+        address.removeprefix("#") for address in Elements(page).attributes("a", "href")[: len(SECTIONS)]
+    ] == SECTIONS
+
+
+def test_is_one_file_without_scripts_or_network(page):
+    elements = Elements(page)
+    assert not elements.open
+    assert not {"script", "iframe"} & {tag for tag, _ in elements.found}
+    addresses = elements.attributes("img", "src") + elements.attributes("link", "href")
+    assert all(address.startswith("data:") for address in addresses)
+    assert "http://" not in page
+    assert "https://" not in page
+    assert not re.search(r"url\(|@import", page)
+
+
+def test_text_is_escaped_once(page):
+    assert "with &lt;full&gt; success" in page
+    assert "<full>" not in page
+    assert "&amp;lt;" not in page
+
+
+def test_numbers_of_the_run(page):
+    for text in ("0123456789abcdef", "Some Processor 9000", "120 of 130", "170 of 180", "11.75", "612"):
+        assert text in page
+
+
+def test_verdicts_are_counted_and_worded(page):
+    for verdict in ("reproduced", "partially", "not reproduced", "inconclusive", "precondition not met", "not run"):
+        assert f">{verdict}: 2</span>" in page
+        assert page.count(f">{verdict}</span>") == 2
+
+
+def test_paper_stands_below_ours(page):
+    rows = re.findall(r"<tr[^>]*><th scope=\"row\">(.*?)</th>", page.split('id="table_1"')[1].split("</table>")[0])
+    assert rows[:3] == ["reach-wall", "95 % t-interval", "paper"]
+    assert "<td><strong>0.91 ± 0.03, n=5</strong></td>" in page
+
+
+@pytest.mark.parametrize(("scale", "options"), [("smoke", "--configfile config/smoke.yaml "), ("desk", "")])
+def test_every_artefact_says_how_to_rerun_it(scale, options):
+    page = build_report(made_up_report(scale))
+    for figure in FIGURES:
+        assert f"rerun: <code>snakemake --cores 2 {options}{figure}</code>" in page
+    assert ("smoke scale: numbers mean nothing" in page) == (scale == "smoke")
+
+
+def test_partial_results_say_what_is_missing():
+    missing = (("table_2", "Unseen tasks"), ("figure_s1", "drawer-close"))
+    page = build_report(made_up_report(missing=missing, claims=(), figures=(), gates=(), tables=()))
+    assert "Partial results, not there yet: Table 2, Figure S1." in page
+    for text in ("No verdicts yet", "No tables yet", "No figures yet", "No gates yet"):
+        assert text in page
+
+
+def test_unknown_numbers_are_dashes():
+    data = made_up_report()
+    page = build_report(replace(data, gates=(replace(data.gates[0], success=float("nan"), metric=None),)))
+    assert page.count("<td>–</td>") == 2
+    assert "nan" not in page.lower().split("<h2>gates</h2>")[1].split("</table>")[0]
+
+
+def test_equal_data_gives_equal_text(page):
+    assert build_report(made_up_report()) == page
+
+
+@needs_chromium
+def test_loads_without_complaints(seen):
+    assert seen["console"] == []
+
+
+@needs_chromium
+def test_every_figure_shows_and_has_a_text(seen):
+    assert len(seen["pictures"]) == len(FIGURES)
+    for shows, text in seen["pictures"]:
+        assert shows
+        assert len(text) > 20
+
+
+@needs_chromium
+def test_fits_the_screen(seen):
+    assert seen["overflow"] <= 0
+    assert seen["wide"] == []
+
+
+@needs_chromium
+def test_links_within_the_page_lead_somewhere(seen):
+    inside = [link for link in seen["links"] if link.startswith("#")]
+    assert len(inside) >= len(SECTIONS)
+    assert all(link[1:] in seen["ids"] for link in inside)
+    assert len(set(seen["ids"])) == len(seen["ids"])
+
+
+@needs_chromium
+def test_headings_leave_no_level_out(seen):
+    levels = [int(tag[1]) for tag, _ in seen["headings"]]
+    assert levels[0] == 1
+    assert levels.count(1) == 1
+    assert all(b - a <= 1 for a, b in itertools.pairwise(levels))
