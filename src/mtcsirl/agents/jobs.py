@@ -38,6 +38,8 @@ class AgentJob:
     task_reward: RewardFunction | None = None
     gate: Literal["expert", "sac"] = "sac"
     keep: Literal["best", "last"] = "best"
+    reward_id: str = ""
+    """Tells learned rewards apart, for example a checksum: a run never resumes from a checkpoint of another reward."""
 
     def mixture(self) -> RewardMixture:
         """The reward that this agent's policy is trained on."""
@@ -46,8 +48,8 @@ class AgentJob:
         return RewardMixture(scale, settings.cs_weight, settings.curriculum, self.f, self.task_reward)
 
     def fingerprint(self) -> str:
-        """Differs between jobs whose results may differ, rewards excepted: a checkpoint of another is not resumed."""
-        key = (self.task, self.target, self.seed, self.cs_reward, self.gate, self.keep)
+        """Differs between jobs whose results may differ: the checkpoint of another job is not resumed."""
+        key = (self.task, self.target, self.seed, self.cs_reward, self.gate, self.keep, self.reward_id)
         return hashlib.sha256(repr((key, self.settings.model_dump_json())).encode()).hexdigest()
 
 

@@ -114,9 +114,9 @@ class FusedSac:
 
     def policy(self, agent: int) -> Policy:
         """A frozen copy of one agent's actor."""
-        weights = [weight[agent].detach().cpu().float().clone() for weight in self.actor.weights]
-        biases = [bias[agent, 0].detach().cpu().float().clone() for bias in self.actor.biases]
-        return Policy(tuple(weights), tuple(biases), *self._log_std_bounds)
+        weights = tuple(weight[agent].cpu().numpy().astype(np.float32) for weight in self.actor.weights)
+        biases = tuple(bias[agent, 0].cpu().numpy().astype(np.float32) for bias in self.actor.biases)
+        return Policy(weights, biases, *self._log_std_bounds)
 
     # --- learning ---------------------------------------------------------------------------------------------
 

@@ -1,0 +1,87 @@
+"""Stored policies: they come back as they were, bad files are refused in one line, others can read an export."""
+
+import json
+
+import numpy as np
+import pytest
+from stable_baselines3 import SAC
+
+from mtcsirl.agents.export import export_sb3
+from mtcsirl.agents.policy import load_policy, save_policy
+from mtcsirl.agents.sac import FusedSac
+from mtcsirl.errors import UserError
+
+
+@pytest.fixture
+def policy(small_sac):
+    return FusedSac(1, small_sac, seeds=[4]).policy(0)
+
+
+@pytest.fixture
+def observations():
+    return np.random.default_rng(0).standard_normal((20, 39)).astype(np.float32)
+
+
+def test_round_trip(policy, observations, tmp_path):
+    save_policy(policy, tmp_path)
+    loaded = load_policy(tmp_path)
+    assert np.array_equal(policy.act(observations), loaded.act(observations))
+    drawn = [one.act(observations, np.random.default_rng(3)) for one in (policy, loaded)]
+    assert np.array_equal(*drawn)
+    assert not np.array_equal(drawn[0], policy.act(observations))
+    assert loaded.observation == "mapped"
+
+
+def test_named_policies_share_a_folder(policy, tmp_path):
+    save_policy(policy, tmp_path, "reach-t1")
+    assert (tmp_path / "reach-t1.safetensors").is_file()
+    load_policy(tmp_path, "reach-t1")
+
+
+@pytest.mark.parametrize("size", [0, 8, 500])
+def test_truncated_weights_are_one_line(policy, tmp_path, size):
+    save_policy(policy, tmp_path)
+    file = tmp_path / "policy.safetensors"
+    file.write_bytes(file.read_bytes()[:size])
+    with pytest.raises(UserError, match=r"policy\.safetensors") as error:
+        load_policy(tmp_path)
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "file"),
+    [
+        ("format", "mtcsirl policy 99", "policy.json"),
+        ("sizes", [39, 16, 16, 9], "policy.safetensors"),
+        ("sizes", "many", "policy.json"),
+        ("sizes", None, "policy.json"),
+        ("observation", "upside-down", "policy.json"),
+        ("min_log_std", "low", "policy.json"),
+    ],
+)
+def test_tampered_description_is_refused(policy, tmp_path, key, value, file):
+    save_policy(policy, tmp_path)
+    description = json.loads((tmp_path / "policy.json").read_text())
+    (tmp_path / "policy.json").write_text(json.dumps(description | {key: value}))
+    with pytest.raises(UserError, match=file):
+        load_policy(tmp_path)
+
+
+def test_missing_policy_is_one_line(tmp_path):
+    with pytest.raises(UserError, match="no such file"):
+        load_policy(tmp_path)
+
+
+def test_exported_zip_is_an_ordinary_model(policy, observations, tmp_path):
+    save_policy(policy, tmp_path)
+    export_sb3(tmp_path, tmp_path / "model.zip")
+    model = SAC.load(tmp_path / "model.zip", device="cpu")
+    actions, _ = model.predict(observations, deterministic=True)
+    np.testing.assert_allclose(actions, policy.act(observations), atol=1e-6)
+
+
+def test_export_refuses_bounds_that_the_other_side_lacks(small_sac, tmp_path):
+    narrow = small_sac.model_copy(update={"min_log_std": -5.0})
+    save_policy(FusedSac(1, narrow, seeds=[0]).policy(0), tmp_path)
+    with pytest.raises(UserError, match="log_std"):
+        export_sb3(tmp_path, tmp_path / "model.zip")
