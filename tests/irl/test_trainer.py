@@ -60,10 +60,13 @@ def test_the_reward_in_the_file_is_the_one_in_memory(method, demonstrations, tmp
     trainer = _run(_trainer(method, demonstrations))
     learn_reward(tmp_path, method, "velocity", demonstrations, 100, irl_settings())
     reward, sample = load_learned_reward(tmp_path), trainer.replay.sample(50)
-    assert torch.equal(reward(sample), trainer.method.discriminators["f"].network(sample))
+    f = trainer.method.discriminators["f"].network
+    assert torch.equal(reward(sample), f(sample) - reward.offset)
+    assert reward.offset == pytest.approx(f(trainer.replay.latest(180)).mean().item(), abs=1e-5)
     if method == "mt_csirl_lt":
         own = Transitions(*(part[1] for part in sample))
-        expected = trainer.method.discriminators["task"].network(sample)[1]
+        task = trainer.method.discriminators["task"].network
+        expected = (task(sample) - task(trainer.replay.latest(180)).mean(dim=1, keepdim=True))[1]
         torch.testing.assert_close(reward.task_reward("drawer-close", 2)(own), expected)
 
 
@@ -74,7 +77,8 @@ def test_generators_are_paid_by_the_reward_of_this_moment(demonstrations) -> Non
     alpha = trainer.curriculum.weight()
     latest = trainer.replay.latest(120).task_reward  # 120 steps, fewer than the window of 256: all count
     torch.testing.assert_close(alpha, latest.mean(dim=1) / 10)
-    expected = sample.task_reward + alpha[:, None] * f(sample)
+    centre = f(trainer.replay.latest(120)).mean(dim=1)
+    expected = sample.task_reward + alpha[:, None] * (f(sample) - centre[:, None])
     torch.testing.assert_close(trainer.policy_reward(sample), expected)
     rowwise = [[f(Transitions(*(part[t, i] for part in sample))).item() for i in range(3)] for t in range(2)]
     torch.testing.assert_close(f(sample)[:, :3], torch.tensor(rowwise))
@@ -95,7 +99,8 @@ def test_warm_up_pays_the_task_reward_alone_and_only_to_methods_that_know_it(dem
 
 
 def test_scales_and_the_curriculum_switch_enter_the_policy_reward(demonstrations) -> None:
-    trainer = _run(_trainer("mt_csirl", demonstrations, curriculum=False, cs_weight=0.5, task_reward_scale=0.1), 2)
+    changes = {"curriculum": False, "cs_weight": 0.5, "task_reward_scale": 0.1, "centre": False}
+    trainer = _run(_trainer("mt_csirl", demonstrations, **changes), 2)
     sample = trainer.replay.sample(16)
     f = trainer.method.discriminators["f"].network(sample)
     torch.testing.assert_close(trainer.policy_reward(sample), 0.1 * sample.task_reward + 0.5 * f)

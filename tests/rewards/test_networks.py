@@ -112,7 +112,9 @@ def _reward(tasks: bool = True) -> LearnedReward:
         cs_reward="velocity",
         observation="mapped",
         members=MEMBERS,
+        offset=1.5,
         task_network=RewardNetwork(ARCHITECTURE, 2, _random()) if tasks else None,
+        task_offsets=(-2.0, 3.0) if tasks else (),
         about={"seed": 100},
     )
 
@@ -123,11 +125,12 @@ def test_learned_reward_survives_its_files(tmp_path, tasks) -> None:
     save_learned_reward(reward, tmp_path)
     again = load_learned_reward(tmp_path)
     assert torch.equal(again(transitions), reward(transitions))
+    assert torch.equal(again(transitions), reward.network(transitions) - 1.5)
     assert (again.method, again.members, again.about) == (reward.method, MEMBERS, {"seed": 100})
     if tasks:
         task = again.task_reward("drawer-close", 1)
         both = Transitions(*(part[:2] for part in transitions))
-        assert torch.equal(task(Transitions(*(part[1] for part in both))), reward.task_network(both)[1])
+        assert torch.equal(task(Transitions(*(part[1] for part in both))), reward.task_network(both)[1] - 3.0)
 
 
 def test_asking_for_a_task_reward_that_does_not_exist_is_one_clear_line() -> None:
@@ -159,6 +162,7 @@ def test_damaged_rewards_do_not_load(tmp_path) -> None:
         ({"members": [["reach", 1]]}, "of another run"),
         ({"networks": {"f": ARCHITECTURE, "task": ARCHITECTURE}}, "expected"),
         ({"networks": {}}, "of another run"),
+        ({"task_offsets": [0.0]}, "1 task offsets instead of 2"),
     ):
         _, description = fresh()
         description.write_text(json.dumps(json.loads(description.read_text()) | change))

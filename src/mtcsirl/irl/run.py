@@ -134,22 +134,28 @@ def _resume(trainer: IrlTrainer, checkpoint: Path, fingerprint: str) -> None:
     trainer.curve, trainer.diagnostics = rows["curve"], rows["diagnostics"]
 
 
-def _write(trainer: IrlTrainer, folder: Path, cs_reward: str, seed: int, about: dict[str, Any]) -> None:
+def _learned(trainer: IrlTrainer, cs_reward: str, about: dict[str, Any]) -> LearnedReward:
     discriminators = trainer.method.discriminators
-    reward = LearnedReward(
-        network=discriminators["f"].network,
+    f, task = discriminators["f"].network, discriminators["task"].network if "task" in discriminators else None
+    return LearnedReward(
+        network=f,
         method=trainer.method.name,
         cs_reward=cs_reward,
         observation=trainer.settings.environment.observation,
         members=trainer.world.members,
-        task_network=discriminators["task"].network if "task" in discriminators else None,
-        about={"seed": seed, **about},
+        offset=float(trainer.centre(f).mean()),
+        task_network=task,
+        task_offsets=tuple(trainer.centre(task).squeeze(1).tolist()) if task else (),
+        about=about,
     )
+
+
+def _write(trainer: IrlTrainer, folder: Path, cs_reward: str, seed: int, about: dict[str, Any]) -> None:
     write_csv(folder / "curve.csv", pd.DataFrame(trainer.curve, columns=list(CURVE_COLUMNS)))
     write_csv(folder / "diagnostics.csv", pd.DataFrame(trainer.diagnostics, columns=list(DIAGNOSTIC_COLUMNS)))
     write_parquet(folder / "samples.parquet", _samples(trainer))
     _evaluate(trainer, folder, cs_reward, seed)
-    save_learned_reward(reward, folder)
+    save_learned_reward(_learned(trainer, cs_reward, {"seed": seed, **about}), folder)
 
 
 def _evaluate(trainer: IrlTrainer, folder: Path, cs_reward: str, seed: int) -> None:

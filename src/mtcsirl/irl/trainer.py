@@ -26,6 +26,8 @@ from mtcsirl.transitions import Transitions
 
 DIAGNOSED = 1024
 """Transitions per side and task that the diagnostics of an iteration look at."""
+CENTRED = 5_000
+"""Last transitions of each generator over which the mean of f is taken."""
 
 
 class IrlTrainer:
@@ -57,6 +59,7 @@ class IrlTrainer:
         self.curriculum = Curriculum(tasks, self.irl.curriculum_window)
         self._random = torch.Generator().manual_seed(own)
         self._paying: dict[str, RewardNetwork] = {}
+        self._centres: dict[str, Tensor] = {}
         self.iteration = 0
         self.curve: list[Row] = []
         self.diagnostics: list[Row] = []
@@ -105,8 +108,17 @@ class IrlTrainer:
         task_reward = self.irl.task_reward_scale * transitions.task_reward
         if self._warming_up:
             return task_reward
-        learned = {name: network(transitions) for name, network in self._paying.items()}
+        learned = {name: network(transitions) - self._centres[name] for name, network in self._paying.items()}
         return self.method.policy_reward(task_reward, learned, self.alpha().unsqueeze(1))
+
+    def centre(self, network: RewardNetwork) -> Tensor:
+        """The mean of a learned reward over each generator's last transitions [T, 1], or 0 without centring.
+
+        A constant in every reward changes no preference between policies, but shifts the critics' target by a hundred
+        times (1 / (1 - gamma)) its value: f starts near log pi - r_task, about -13, whatever it has to say.
+        """
+        latest = self.replay.latest(min(CENTRED, self.replay.size))
+        return network(latest).mean(dim=1, keepdim=True) * float(self.irl.centre)
 
     # --- discriminators -----------------------------------------------------------------------------------------
 
@@ -118,6 +130,7 @@ class IrlTrainer:
         for name, discriminator in self.method.discriminators.items():
             update = self._update_as_printed if as_printed else self._update_batched
             self._paying[name], norms[name] = update(discriminator, batches)
+            self._centres[name] = self.centre(self._paying[name])
         return norms
 
     @staticmethod

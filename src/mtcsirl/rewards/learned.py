@@ -18,7 +18,7 @@ WEIGHTS, DESCRIPTION = "reward.safetensors", "reward.json"
 
 @dataclass(frozen=True)
 class LearnedReward:
-    """f(s, a, s'), frozen; called on transitions [...] it gives rewards [...].
+    """f(s, a, s') = network - offset, frozen; called on transitions [...] it gives rewards [...].
 
     ``observation`` names the observation map it was trained on and ``members`` the (task, target) pairs whose
     demonstrations it saw. MT-CSIRL+LT has ``task_network`` beside f: one task reward per member.
@@ -29,13 +29,15 @@ class LearnedReward:
     cs_reward: str
     observation: str
     members: tuple[tuple[str, int], ...]
+    offset: float = 0.0
     task_network: RewardNetwork | None = None
+    task_offsets: tuple[float, ...] = ()
     about: dict[str, Any] = field(default_factory=dict)
     """Anything else worth keeping in the description, such as experiment and seed."""
 
     def __call__(self, transitions: Transitions) -> Tensor:
         """The learned reward f [...] of transitions [...]."""
-        return self.network(transitions)
+        return self.network(transitions) - self.offset
 
     def task_reward(self, task: str, target: int) -> RewardFunction:
         """The learned task reward of one (task, target) pair of MT-CSIRL+LT.
@@ -48,7 +50,9 @@ class LearnedReward:
         if (task, target) not in self.members:
             known = ", ".join(f"{name}-t{index}" for name, index in self.members)
             raise UserError(f"no learned task reward for {task}-t{target}; this run has {known}")
-        return self.task_network.member(self.members.index((task, target)))
+        index = self.members.index((task, target))
+        network, offset = self.task_network.member(index), self.task_offsets[index]
+        return lambda transitions: network(transitions) - offset
 
 
 def save_learned_reward(reward: LearnedReward, folder: Path | str) -> None:
@@ -65,6 +69,8 @@ def save_learned_reward(reward: LearnedReward, folder: Path | str) -> None:
             "observation": reward.observation,
             "members": [list(member) for member in reward.members],
             "networks": {name: network.architecture for name, network in networks.items()},
+            "offset": reward.offset,
+            "task_offsets": list(reward.task_offsets),
             "sha256": storage.checksum(folder / WEIGHTS),
             "about": reward.about,
         },
@@ -93,7 +99,9 @@ def load_learned_reward(folder: Path | str) -> LearnedReward:
             cs_reward=said["cs_reward"],
             observation=said["observation"],
             members=members,
+            offset=float(said["offset"]),
             task_network=networks.get("task"),
+            task_offsets=_offsets(said["task_offsets"], len(members) if "task" in networks else 0),
             about=said["about"],
         )
     except (KeyError, TypeError, ValueError) as error:
@@ -108,3 +116,9 @@ def _networks(
     if set(found) != set(tensors) or any(name in found and len(found[name]) != count for name, count in expected):
         raise ValueError("its tensors are of another run")
     return {name: RewardNetwork.from_parameters(architectures[name], tensor) for name, tensor in found.items()}
+
+
+def _offsets(values: Sequence[float], expected: int) -> tuple[float, ...]:
+    if len(values) != expected:
+        raise ValueError(f"{len(values)} task offsets instead of {expected}")
+    return tuple(float(value) for value in values)

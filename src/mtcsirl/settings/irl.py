@@ -80,6 +80,12 @@ class IrlSettings(Frozen):
     )
     task_reward_scale: float = key(1.0, "factor on r_task in logit and policy reward", paper=1.0, gt=0)
     cs_weight: float = key(1.0, "alpha: factor on f in the policy reward beside the curriculum", paper=1.0, gt=0)
+    centre: bool = key(
+        True,
+        "subtract from f its mean over the generators' last transitions, in the policy reward and in what is saved:"
+        " no preference changes, but critics start near the right level",
+        paper=False,
+    )
     temperature: Temperature = key(1.0, "generators: automatic or fixed entropy temperature", paper="automatic")
     initial_temperature: float = key(1.0, "generators: start of the automatic temperature", gt=0)
     discriminator: DiscriminatorSettings = key(DiscriminatorSettings, "the learned reward")

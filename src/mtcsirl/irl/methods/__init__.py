@@ -1,19 +1,35 @@
-"""The registry of IRL methods: name -> what builds it. A new method is one file here and one line below."""
+"""The registry of IRL methods: name -> what builds it. A new method is one file here and one name below.
+
+The file ``<name>.py`` holds a function ``<name>``; it is imported when the method is built, so that a configuration can
+be checked against this registry without torch.
+"""
+
+from __future__ import annotations
 
 from collections.abc import Callable
+from importlib import import_module
+from typing import TYPE_CHECKING
 
-from mtcsirl.irl.discriminator import Method
-from mtcsirl.irl.methods.base import Setup
-from mtcsirl.irl.methods.mt_airl import mt_airl
-from mtcsirl.irl.methods.mt_csirl import mt_csirl
-from mtcsirl.irl.methods.mt_csirl_lt import mt_csirl_lt
-from mtcsirl.irl.methods.mt_vairl import mt_vairl
-from mtcsirl.irl.methods.mt_vairl_gp import mt_vairl_gp
+if TYPE_CHECKING:
+    from mtcsirl.irl.discriminator import Method
+    from mtcsirl.irl.methods.base import Setup
+
+
+def _builder(name: str) -> Callable[[Setup], Method]:
+    def build(setup: Setup) -> Method:
+        method: Method = getattr(import_module(f"mtcsirl.irl.methods.{name}"), name)(setup)
+        return method
+
+    return build
+
 
 METHODS: dict[str, Callable[[Setup], Method]] = {
-    "mt_airl": mt_airl,
-    "mt_vairl": mt_vairl,
-    "mt_vairl_gp": mt_vairl_gp,
-    "mt_csirl": mt_csirl,
-    "mt_csirl_lt": mt_csirl_lt,
+    name: _builder(name)
+    for name in (
+        "mt_airl",
+        "mt_vairl",
+        "mt_vairl_gp",
+        "mt_csirl",
+        "mt_csirl_lt",
+    )
 }
