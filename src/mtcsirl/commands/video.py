@@ -1,0 +1,45 @@
+"""The verb that renders stored policies."""
+
+import argparse
+from pathlib import Path
+
+from mtcsirl.commands.arguments import Verbs, add_verb, natural, target, task
+from mtcsirl.errors import UserError
+
+
+def register(verbs: Verbs) -> None:
+    """Add the verb."""
+    verb = add_verb(
+        verbs,
+        "video",
+        _video,
+        does="render stored policies side by side",
+        needs="run folders with policy.safetensors, policy.json and (without --task) evaluation.csv; Debian's "
+        "libosmesa6; imageio-ffmpeg for MP4",
+        writes="the file --output, a GIF or MP4",
+    )
+    verb.add_argument("folders", nargs="+", type=Path, metavar="FOLDER", help="run folder of an expert, SAC, ...")
+    verb.add_argument("--output", required=True, type=Path, metavar="FILE", help="ends in .gif or .mp4")
+    verb.add_argument("--label", action="append", default=[], metavar="TEXT", help="one per folder, in their order")
+    verb.add_argument("--task", type=task, metavar="TASK", help="another task than the one that was trained on")
+    verb.add_argument("--target", type=target, metavar="INDEX", help="another target than the one that was trained on")
+    verb.add_argument("--steps", type=natural, default=500, help="environment steps, at most 500")
+    verb.add_argument("--seed", type=natural, default=0, help="draws the actions of the stochastic policies")
+    verb.add_argument("--deterministic", action="store_true", help="show the modes of the policies instead")
+    verb.add_argument("--size", type=natural, default=320, help="edge of a panel in pixels")
+    verb.add_argument("--target-seed", type=natural, default=0, help="seed of Meta-World's targets")
+
+
+def _video(parsed: argparse.Namespace) -> None:
+    from mtcsirl.video import clip_of, render_video
+
+    if parsed.label and len(parsed.label) != len(parsed.folders):
+        raise UserError(f"--label: {len(parsed.label)} labels for {len(parsed.folders)} folders; give one per folder")
+    labels = parsed.label or [None] * len(parsed.folders)
+    clips = [
+        clip_of(folder, task=parsed.task, target=parsed.target, label=label)
+        for folder, label in zip(parsed.folders, labels, strict=True)
+    ]
+    seed = None if parsed.deterministic else parsed.seed
+    render_video(clips, parsed.output, steps=parsed.steps, seed=seed, size=parsed.size, target_seed=parsed.target_seed)
+    print(parsed.output)
