@@ -1,9 +1,12 @@
 """What every reward function and discriminator reads: a batch of transitions."""
 
-from collections.abc import Callable
-from typing import NamedTuple
+from __future__ import annotations
 
-from torch import Tensor
+from collections.abc import Callable
+from typing import TYPE_CHECKING, NamedTuple
+
+if TYPE_CHECKING:
+    from torch import Tensor
 
 
 class Transitions(NamedTuple):
@@ -20,5 +23,5 @@ class Transitions(NamedTuple):
     task_reward: Tensor
 
 
-RewardFunction = Callable[[Transitions], Tensor]
+RewardFunction = Callable[[Transitions], "Tensor"]
 """Maps transitions [..., *] to rewards [...]."""

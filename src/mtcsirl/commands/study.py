@@ -56,11 +56,11 @@ def register(verbs: Verbs) -> None:
         verbs,
         "settings",
         _settings,
-        does="print the configuration: with its comments, as JSON, as JSON schema, or only check it",
+        does="print the configuration (template: with comments; json; schema; defaults: as the classes have it) or check it",
         needs="nothing",
         writes="nothing",
     )
-    settings.add_argument("form", choices=("template", "json", "schema", "check"))
+    settings.add_argument("form", choices=("template", "json", "schema", "defaults", "check"))
     add_study_settings(settings)
 
     calibrate = add_verb(
@@ -153,6 +153,9 @@ def _deviations(parsed: argparse.Namespace) -> None:
 def _settings(parsed: argparse.Namespace) -> None:
     from mtcsirl.settings.template import schema, template
 
+    if parsed.form == "defaults":
+        print(template(), end="")
+        return
     settings = study_settings(parsed)
     if parsed.form == "template":
         print(template(settings), end="")

@@ -5,13 +5,16 @@ targets. We read 0.8 and 3 as the targets, which its experts reach (0.81 and 2.9
 weight beside the task reward is a setting of the expert.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from dataclasses import dataclass
-
-import torch
-from torch import Tensor
+from typing import TYPE_CHECKING
 
 from mtcsirl.transitions import Transitions
+
+if TYPE_CHECKING:
+    from torch import Tensor
 
 STEP_SECONDS = 0.0125
 """Time between two observations: 5 steps of the simulator of 0.0025 s each."""
@@ -27,7 +30,7 @@ def velocity(transitions: Transitions) -> Tensor:
     and a position of 0.6 m is known to 6e-8 m only; and a transition whose s' alone is stored can be measured too.
     """
     after = transitions.next_observation
-    return torch.linalg.vector_norm(after[..., _HAND] - after[..., _PREVIOUS_HAND], dim=-1) / STEP_SECONDS
+    return (after[..., _HAND] - after[..., _PREVIOUS_HAND]).norm(dim=-1) / STEP_SECONDS
 
 
 def action_norm(transitions: Transitions) -> Tensor:

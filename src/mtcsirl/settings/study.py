@@ -1,9 +1,12 @@
 """The root of the configuration: what the study consists of."""
 
+from collections.abc import Mapping
 from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field, model_validator
 
+from mtcsirl.irl.methods import METHODS as METHOD_REGISTRY
+from mtcsirl.rewards.ground_truth import COMMON_SENSE_REWARDS
 from mtcsirl.settings.base import Frozen, key
 from mtcsirl.settings.irl import IrlSettings, ScoreSettings, TransferSettings
 from mtcsirl.settings.learner import (
@@ -31,6 +34,20 @@ def _known_task(name: str) -> str:
     return name
 
 
+def _known_method(name: str) -> str:
+    return _registered(name, METHOD_REGISTRY, "method")
+
+
+def _known_cs_reward(name: str) -> str:
+    return _registered(name, COMMON_SENSE_REWARDS, "common-sense reward")
+
+
+def _registered(name: str, registry: Mapping[str, object], what: str) -> str:
+    if name not in registry:
+        raise ValueError(f"unknown {what} {name!r}; allowed: {', '.join(registry)}")
+    return name
+
+
 def _unique(values: tuple) -> tuple:
     if len(set(values)) != len(values):
         raise ValueError("lists an entry twice")
@@ -49,6 +66,8 @@ def _known_budget_keys(budget: dict[str, int]) -> dict[str, int]:
 Task = Annotated[str, AfterValidator(_known_task)]
 Tasks = Annotated[tuple[Task, ...], Field(min_length=1), AfterValidator(_unique)]
 Target = Annotated[int, Field(ge=0, lt=TARGETS_PER_TASK)]
+Method = Annotated[str, AfterValidator(_known_method)]
+CsReward = Annotated[str, AfterValidator(_known_cs_reward)]
 Targets = Annotated[tuple[Target, ...], Field(min_length=1), AfterValidator(_unique)]
 Seed = Annotated[int, Field(ge=0)]
 Seeds = Annotated[tuple[Seed, ...], Field(min_length=1), AfterValidator(_unique)]
@@ -98,7 +117,7 @@ class ExpertSettings(RewardScaleSettings):
         unit="environment steps",
         paper={"default": 250_000},
     )
-    cs_weight: dict[Literal["velocity", "action_norm"] | str, Annotated[float, Field(gt=0)]] = key(
+    cs_weight: dict[CsReward, Annotated[float, Field(gt=0)]] = key(
         lambda: {"velocity": 20.0, "action_norm": 5.0},
         "C_v, C_n: weight of the ground-truth cs-reward beside r_task in [0, 10]",
     )
@@ -156,10 +175,10 @@ class Settings(Frozen):
         "seeds of IRL runs; a transfer agent takes the run of its own seed, or cycles through them",
         paper=(0, 1, 2, 3, 4),
     )
-    cs_rewards: Annotated[tuple[str, ...], Field(min_length=1), AfterValidator(_unique)] = key(
+    cs_rewards: Annotated[tuple[CsReward, ...], Field(min_length=1), AfterValidator(_unique)] = key(
         CS_REWARDS, "common-sense rewards", paper=CS_REWARDS
     )
-    methods: Annotated[tuple[str, ...], Field(min_length=1), AfterValidator(_unique)] = key(
+    methods: Annotated[tuple[Method, ...], Field(min_length=1), AfterValidator(_unique)] = key(
         METHODS, "IRL methods of the multi-task experiment", paper=METHODS
     )
     single_target: SingleTargetSettings = key(SingleTargetSettings, "section 5.1")

@@ -14,8 +14,8 @@ from mtcsirl.settings.study import Settings
 
 WIDTH = 120
 HEAD = """\
-# The configuration of the whole study, scale desk. Written by `mtcsirl settings template` from the classes in
-# src/mtcsirl/settings/, which also hold the defaults: a key left out takes the value that stands here.
+# The configuration of the whole study, scale desk. Written by `mtcsirl settings defaults` from the classes in
+# src/mtcsirl/settings/, which hold the defaults: a key left out takes the value that stands here.
 #
 # Above each key: what it is [unit]; the paper's value, where the paper gives one. The values below that differ from
 # the paper's are listed by `mtcsirl deviations` and printed under every table.
