@@ -85,6 +85,13 @@ def test_few_points_are_drawn_of_many(settings):
     assert "9,000 transitions" in scatter_caption(found, "velocity")
 
 
+def test_paper_stands_beside_ours(settings):
+    data = FigureData(settings=settings, scores=pd.DataFrame([score(0, 0.5)]))
+    assert "r = 0.50 [0.40, 0.60] (paper: 0.18)" in scatter_caption(select_correlation(data, **KEY), "velocity")
+    unknown = select_correlation(data, **KEY | {"cs_reward": "action_norm"})
+    assert "paper" not in scatter_caption(unknown, "action_norm")
+
+
 def test_words_without_interval_or_value():
     assert correlation_words(Estimate(0.18, np.nan, np.nan, 1)) == "r = 0.18"
     assert correlation_words(Estimate(np.nan, np.nan, np.nan, 0)) == "r undefined"

@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from mtcsirl.analysis.statistics import Estimate, mean_correlation
 from mtcsirl.figures.data import FigureData, rows_where
 from mtcsirl.figures.style import TEXT_WIDTH, add_notes, empty_panel, look, new_figure, quantity, scale_notes, styled
+from mtcsirl.published import load_published
 
 SHOWN_POINTS = 2000
 PRIMARY_TRANSITIONS = "sac"
@@ -24,11 +25,12 @@ TRANSITION_SETS = {
 
 @dataclass(frozen=True)
 class Correlation:
-    """Points and correlation of one learned reward on one transition set, all seeds."""
+    """Points and correlation of one learned reward on one transition set, all seeds; ``paper`` is its number or NaN."""
 
     points: pd.DataFrame
     estimate: Estimate
     transitions: str
+    paper: float
 
     @property
     def transition_name(self) -> str:
@@ -70,7 +72,8 @@ def select_correlation(
     if len(rows) == 1:
         row = rows.iloc[0]
         estimate = Estimate(row["value"], row["low"], row["high"], 1)
-    return Correlation(points, estimate, transitions)
+    paper = load_published().correlation(experiment, cs_reward).mean
+    return Correlation(points, estimate, transitions, paper)
 
 
 def draw_scatter(axes: Axes, found: Correlation, method: str, cs_reward: str) -> None:
@@ -122,9 +125,10 @@ def correlation_words(estimate: Estimate) -> str:
 def scatter_caption(found: Correlation, cs_reward: str) -> str:
     """What a scatter shows: set, number of points and seeds, correlation with its interval."""
     interval = "95 % t-interval over seeds on Fisher's z scale" if found.estimate.n > 1 else "95 % bootstrap interval"
+    paper = "" if np.isnan(found.paper) else f" (paper: {found.paper:.2f})"
     return (
-        f"True against learned {quantity(cs_reward)} cs-reward on {found.transition_name}: Pearson {found.words()}, "
-        f"{interval}, {found.counts()} with up to {found.per_seed:,} transitions each; "
+        f"True against learned {quantity(cs_reward)} cs-reward on {found.transition_name}: "
+        f"Pearson {found.words()}{paper}, {interval}, {found.counts()} with up to {found.per_seed:,} transitions each; "
         f"at most {SHOWN_POINTS:,} points are drawn. The learned reward is standardised per seed."
     )
 

@@ -105,7 +105,7 @@ def new_figure(width: float, height: float) -> Figure:
 
 
 def figure_bytes(figure: Figure, kind: Literal["png", "pdf"], caption: str = "") -> bytes:
-    """The figure as a PNG or PDF file that carries its caption; equal figures give equal bytes (no date, no program)."""
+    """The figure as a PNG or PDF file that carries its caption; no date, so equal figures give equal bytes."""
     stamp = {
         "pdf": {"CreationDate": None, "Producer": None, "Subject": caption},
         "png": {"Software": None, "Description": caption},
