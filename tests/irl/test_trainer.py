@@ -106,10 +106,8 @@ def test_scales_and_the_curriculum_switch_enter_the_policy_reward(demonstrations
     torch.testing.assert_close(trainer.policy_reward(sample), 0.1 * sample.task_reward + 0.5 * f)
 
 
-@pytest.mark.parametrize(
-    ("method", "uses_curriculum"), [("mt_airl", False), ("mt_vairl", False), ("mt_csirl_lt", False)]
-)
-def test_methods_without_the_task_reward_never_see_it(method, uses_curriculum, demonstrations) -> None:
+@pytest.mark.parametrize("method", ["mt_airl", "mt_vairl", "mt_vairl_gp", "mt_csirl_lt"])
+def test_methods_without_the_task_reward_never_see_it(method, demonstrations) -> None:
     trainer = _run(_trainer(method, demonstrations), 2)
     sample = trainer.replay.sample(16)
     other = sample._replace(task_reward=sample.task_reward + 5.0)
@@ -119,6 +117,19 @@ def test_methods_without_the_task_reward_never_see_it(method, uses_curriculum, d
     changed = batch._replace(generator=batch.generator._replace(task_reward=batch.generator.task_reward + 5.0))
     for discriminator in trainer.method.discriminators.values():
         assert torch.equal(discriminator.logits(batch)[1], discriminator.logits(changed)[1])
+
+
+def test_unknown_task_rewards_get_the_curriculum_only_if_asked_for(demonstrations) -> None:
+    trainer = _run(_trainer("mt_csirl_lt", demonstrations, unknown_task_curriculum=True), 1)
+    torch.testing.assert_close(trainer.alpha(), trainer.replay.latest(60).task_reward.mean(dim=1) / 10)
+
+
+def test_centred_rewards_average_zero_for_each_generator(demonstrations) -> None:
+    trainer = _run(_trainer("mt_airl", demonstrations), 2)
+    latest = trainer.replay.latest(120)
+    torch.testing.assert_close(trainer.policy_reward(latest).mean(dim=1), torch.zeros(2), atol=1e-4, rtol=0)
+    raw = _run(_trainer("mt_airl", demonstrations, centre=False), 2)
+    assert raw.policy_reward(latest).mean(dim=1).abs().min() > 0.01
 
 
 def _same(first: IrlTrainer, second: IrlTrainer) -> bool:
