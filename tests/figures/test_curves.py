@@ -81,3 +81,6 @@ def test_panel_without_runs_says_so():
     axes = new_figure(2, 2).subplots()
     draw_curves(axes, [series({}, [("a", 0)])], "velocity", 0.8)
     assert "no runs yet" in [text.get_text() for text in axes.texts]
+    axes = new_figure(2, 2).subplots()
+    draw_curves(axes, [series({}, [])], "velocity", 0.8)
+    assert "not part of this study" in [text.get_text() for text in axes.texts]

@@ -39,9 +39,17 @@ def made_up_report(scale: str = "desk", **changes) -> ReportData:
                 f"C{number + 1}",
                 "Experts trained on task and ground-truth cs-reward reach both targets with <full> success.",
                 "Table 2, row Expert",
-                VERDICTS[number % len(VERDICTS)],
                 "mean distance to the target at most 15 % & mean success at least 90 %",
-                (("velocity, reach-wall", "0.81 ± 0.02", "0.79 [0.75, 0.83]", "met"),),
+                VERDICTS[number % len(VERDICTS)],
+                "1 met of 1 units",
+                (
+                    (
+                        "velocity, reach-wall",
+                        "0.81±0.02 [0.77, 0.85] (ours inside)",
+                        "0.79±0.03 (n=5), success 100 %",
+                        "met",
+                    ),
+                ),
             )
             for number in range(12)
         ),

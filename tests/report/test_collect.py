@@ -3,9 +3,12 @@
 import re
 from pathlib import Path
 
+import pandas as pd
 import pytest
 
 from mtcsirl import storage
+from mtcsirl.analysis.claims import claims_json, judge
+from mtcsirl.analysis.rows import ROW_COLUMNS, SCORE_COLUMNS
 from mtcsirl.design import ARTEFACTS, design
 from mtcsirl.errors import UserError
 from mtcsirl.figures.style import figure_bytes, new_figure
@@ -33,7 +36,8 @@ PROVENANCE = {
     "cost": {"wall_seconds": 900.0, "cpu_seconds": 720.0, "peak_memory_mib": 500.5},
     "inputs": {},
 }
-CLAIMS = {"claims": []}
+NO_ROWS = pd.DataFrame({name: [] for name in ROW_COLUMNS})
+NO_SCORES = pd.DataFrame({name: [] for name in SCORE_COLUMNS})
 
 
 @pytest.fixture(scope="module")
@@ -60,7 +64,9 @@ def results(tmp_path_factory):
         else:
             storage.write_bytes(root / "figures" / f"{name}.png", png)
             storage.write_bytes(root / "figures" / f"{name}.pdf", b"%PDF")
-    storage.write_json(root / "results" / "claims" / "claims.json", CLAIMS)
+    storage.write_json(
+        root / "results" / "claims" / "claims.json", claims_json(judge(NO_ROWS, NO_SCORES, settings), settings)
+    )
     return settings, root
 
 
@@ -80,6 +86,16 @@ def test_whole_study(results):
     assert [table.name for table in data.tables] == [f"table_{n}" for n in range(1, 6)]
     assert [figure.name for figure in data.figures] == [name for name in ARTEFACTS if name.startswith("figure_")]
     assert {figure.caption for figure in data.figures} == {"what it shows, n = 1 seed"}
+
+
+def test_claims_are_the_judged_ones(results):
+    settings, root = results
+    claims = collect(settings, root / "page.html").claims
+    assert [claim.name for claim in claims] == [f"C{number}" for number in range(1, 13)]
+    assert {claim.verdict for claim in claims} == {"not run"}
+    assert claims[0].locus == "Table 2, row Expert"
+    assert claims[0].units[0][0].endswith("reach-wall")
+    assert all(claim.criterion and claim.reason for claim in claims)
 
 
 def test_gates_are_counted_by_agent_task_and_cs_reward(results):

@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from mtcsirl.analysis.statistics import summarise, t_interval
-from mtcsirl.figures.style import TARGET_COLOUR, Look, empty_panel, quantity_label
+from mtcsirl.figures.style import NO_RUNS, NOT_ASKED, TARGET_COLOUR, Look, empty_panel, quantity_label
 
 BINS = 40
 
@@ -91,7 +91,7 @@ def draw_curves(axes: Axes, series: Sequence[Series], metric: str, target: float
             textcoords="offset points", ha="right", va="bottom", color=TARGET_COLOUR, fontsize=6.5,
         )  # fmt: skip
     if all(one.rows.empty for one in series):
-        empty_panel(axes, "no runs yet")
+        empty_panel(axes, NO_RUNS if any(one.expected for one in series) else NOT_ASKED)
     axes.set_ylim(0, 1.2 * max(heights, default=1.0))
     axes.set_xlim(left=0)
     axes.set_xlabel("environment steps")

@@ -9,7 +9,17 @@ from matplotlib.figure import Figure
 
 from mtcsirl.analysis.statistics import Estimate, mean_correlation
 from mtcsirl.figures.data import FigureData, rows_where
-from mtcsirl.figures.style import TEXT_WIDTH, add_notes, empty_panel, look, new_figure, quantity, scale_notes, styled
+from mtcsirl.figures.style import (
+    NO_RUNS,
+    TEXT_WIDTH,
+    add_notes,
+    empty_panel,
+    look,
+    new_figure,
+    quantity,
+    scale_notes,
+    styled,
+)
 from mtcsirl.published import load_published
 
 SHOWN_POINTS = 2000
@@ -85,7 +95,7 @@ def draw_scatter(axes: Axes, found: Correlation, method: str, cs_reward: str) ->
     axes.set_xlabel(f"true cs-reward ({quantity(cs_reward)})")
     axes.set_ylabel("learned cs-reward\n(standardised per seed)")
     if found.points.empty:
-        empty_panel(axes, "no runs yet")
+        empty_panel(axes, NO_RUNS)
         return
     standard = standardise(found.points)
     shown = standard.iloc[np.linspace(0, len(standard) - 1, min(SHOWN_POINTS, len(standard))).astype(int)]

@@ -17,6 +17,8 @@ from matplotlib.figure import Figure
 TEXT_WIDTH = 5.5
 """Width of the paper's text in inches; figures are drawn at the size at which they are printed."""
 SMOKE_NOTE = "smoke scale: numbers mean nothing"
+NO_RUNS, NOT_ASKED = "no runs yet", "not part of this study"
+"""Why a panel is empty."""
 TARGET_COLOUR = "#C00000"
 NOTE_COLOUR = "#8C2D04"
 INK = "#222222"

@@ -141,10 +141,9 @@ def _claims(path: Path, partial: bool) -> tuple[Claim, ...]:
 
 
 def _claim(found: dict[str, Any]) -> Claim:
-    criteria = tuple(
-        (str(unit["unit"]), str(unit["paper"]), str(unit["ours"]), str(unit["answer"])) for unit in found["units"]
-    )
-    return Claim(found["name"], found["text"], found["locus"], found["verdict"], found.get("criterion", ""), criteria)
+    units = tuple((unit["unit"], unit["paper"], unit["ours"], unit["answer"]) for unit in found["units"])
+    texts = {name: found[name] for name in ("name", "text", "locus", "criterion", "verdict", "reason")}
+    return Claim(**texts, units=units)
 
 
 def _gates(study: Study, results: Path) -> tuple[GateLine, ...]:

@@ -28,14 +28,15 @@ class WhatWasRun:
 
 @dataclass(frozen=True)
 class Claim:
-    """One claim with its verdict; ``criteria`` are (what was asked, paper, ours, answer)."""
+    """One claim with its verdict; ``units`` are (what was judged, paper, ours, answer)."""
 
     name: str
     text: str
     locus: str
+    criterion: str
     verdict: str
-    reason: str = ""
-    criteria: tuple[tuple[str, str, str, str], ...] = ()
+    reason: str
+    units: tuple[tuple[str, str, str, str], ...] = ()
 
 
 @dataclass(frozen=True)
