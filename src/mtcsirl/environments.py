@@ -122,8 +122,7 @@ class TaskEnvironment(gymnasium.Env[np.ndarray, np.ndarray]):
         self.observation_space = Box(-np.inf, np.inf, (OBSERVATION_SIZE,), np.float32)
         self.action_space = Box(-1.0, 1.0, (ACTION_SIZE,), np.float32)
         self.render_mode = "rgb_array" if render else None
-        size = {"width": PICTURE_SIZE, "height": PICTURE_SIZE}
-        self._renderer = SceneRenderer(simulator.model, **size) if render else None
+        self._renderer = SceneRenderer(simulator.model, width=PICTURE_SIZE, height=PICTURE_SIZE) if render else None
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None

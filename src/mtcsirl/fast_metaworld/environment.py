@@ -1,6 +1,7 @@
 """What every Meta-World task shares, done with less work."""
 
 import math
+from functools import cached_property
 from typing import Any
 
 import mujoco
@@ -30,7 +31,28 @@ class FastEnvironment(SawyerXYZEnv):
         self._first_reset: Snapshot | None = None
         super().__init__()
         self._pad_geoms = tuple(self.model.geom(name).id for name in ("leftpad_geom", "rightpad_geom"))
+        self._mocap, self._grip = self.data.mocap_pos[0], self.data.ctrl
         self._divergences = self.data.warning.number[_BAD_STATE]
+
+    @cached_property
+    def _hand(self) -> np.ndarray:
+        return self._position("body", "hand")
+
+    @cached_property
+    def _right_claw(self) -> np.ndarray:
+        return self._position("body", "rightclaw")
+
+    @cached_property
+    def _left_claw(self) -> np.ndarray:
+        return self._position("body", "leftclaw")
+
+    @cached_property
+    def _right_finger(self) -> np.ndarray:
+        return self._position("site", "rightEndEffector")
+
+    @cached_property
+    def _left_finger(self) -> np.ndarray:
+        return self._position("site", "leftEndEffector")
 
     def fix_target(self, vector: np.ndarray) -> None:
         """Fix the target and show it in the observation; what ``set_task`` does, without its pickle."""
@@ -46,31 +68,27 @@ class FastEnvironment(SawyerXYZEnv):
     @property
     def diverged(self) -> bool:
         """Whether MuJoCo met a state that is not finite or too large since the last reset, and started over."""
-        return bool(self._divergences.any())
+        return bool(np.count_nonzero(self._divergences))
 
     def reset(
         self, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[np.ndarray, dict[str, Any]]:
         """Return the first observation [39] and an empty dictionary."""
         if self._first_reset is None:
-            observation, _ = super().reset(seed=seed, options=options)
-            first_reset = Snapshot(self, observation)
-        else:
-            first_reset = self._first_reset
-            observation = first_reset.restore(self)
-        self._first_reset = first_reset
-        return observation, {}
+            observation, _ = super().reset()
+            self._first_reset = Snapshot()
+            self._first_reset.take(self, observation)
+        return self._first_reset.restore(self), {}
 
     def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:  # type: ignore[override]
         """Apply an action [4] for 5 steps of the simulation."""
         if self.curr_path_length >= self.max_path_length:
             raise ValueError("the episode has ended: call reset()")
-        data = self.data
         self.set_xyz_action(action[:3])
-        data.ctrl[:] = (action[3], -action[3])
-        mujoco.mj_step(self.model, data, nstep=self.frame_skip)
-        # Not redundant: it also sets the solver's warm start for the next step.
-        mujoco.mj_forward(self.model, data)
+        self._grip[:] = (action[3], -action[3])
+        mujoco.mj_step(self.model, self.data, nstep=self.frame_skip)
+        # Places bodies and contacts after the last step, and sets the solver's warm start for the next.
+        mujoco.mj_forward(self.model, self.data)
         self.curr_path_length += 1
         observation = self._get_obs()
         np.maximum(observation, self._low, out=observation)
@@ -81,9 +99,9 @@ class FastEnvironment(SawyerXYZEnv):
     def set_xyz_action(self, action: np.ndarray) -> None:
         """Move the mocap body, to which the hand is welded, by the action [3] in centimetres."""
         move = np.minimum(np.maximum(action, -1), 1) * self.action_scale
-        position = self.data.mocap_pos[0]
-        np.maximum(position + move, self.mocap_low, out=position)
-        np.minimum(position, self.mocap_high, out=position)
+        np.add(self._mocap, move, out=self._mocap)
+        np.maximum(self._mocap, self.mocap_low, out=self._mocap)
+        np.minimum(self._mocap, self.mocap_high, out=self._mocap)
         self.data.mocap_quat[0] = _GRIPPER_QUATERNION
 
     def get_body_com(self, body_name: str) -> np.ndarray:
@@ -92,18 +110,18 @@ class FastEnvironment(SawyerXYZEnv):
 
     def get_endeff_pos(self) -> np.ndarray:
         """Return the position [3] of the hand, a view that follows it."""
-        return self._position("body", "hand")
+        return self._hand
 
     @property
     def tcp_center(self) -> np.ndarray:
         """The point [3] between the two fingers."""
-        return (self._position("site", "rightEndEffector") + self._position("site", "leftEndEffector")) / 2.0
+        return (self._right_finger + self._left_finger) / 2.0
 
     def touching_object(self, object_geom_id: int) -> bool:
         """Return whether both pads of the gripper press on the object."""
         contact = self.data.contact
         of_object = (contact.geom == object_geom_id).any(axis=1)
-        return of_object.any() and all(self._pressure(pad, of_object) > 0 for pad in self._pad_geoms)
+        return bool(of_object.any()) and all(self._pressure(pad, of_object) > 0 for pad in self._pad_geoms)
 
     def _pressure(self, pad: int, of_object: np.ndarray) -> float:
         contact = self.data.contact
@@ -114,9 +132,9 @@ class FastEnvironment(SawyerXYZEnv):
         return self._position("site", site_name).copy()
 
     def _get_curr_obs_combined_no_goal(self) -> np.ndarray:
-        between = self._position("body", "rightclaw") - self._position("body", "leftclaw")
+        between = self._right_claw - self._left_claw
         frame = np.zeros(18)
-        frame[0:3] = self.get_endeff_pos()
+        frame[0:3] = self._hand
         frame[3] = min(math.sqrt(between.dot(between)) / 0.1, 1.0)
         positions, quaternions = self._get_pos_objects(), self._get_quat_objects()
         for i in range(len(positions) // 3):

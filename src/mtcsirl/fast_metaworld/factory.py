@@ -4,7 +4,7 @@ from functools import cache
 
 from metaworld.env_dict import ALL_V3_ENVIRONMENTS
 
-from mtcsirl.fast_metaworld.borrowed import rebound_methods
+from mtcsirl.fast_metaworld.borrowed import with_faster_helpers
 from mtcsirl.fast_metaworld.environment import FastEnvironment
 from mtcsirl.fast_metaworld.targets import target_vectors
 
@@ -20,5 +20,5 @@ def make_fast_environment(task: str, target: int, target_seed: int = 0) -> FastE
 @cache
 def fast_class(task: str) -> type[FastEnvironment]:
     """Return Meta-World's class of the task with ``FastEnvironment`` laid over it."""
-    task_class = ALL_V3_ENVIRONMENTS[f"{task}-v3"]
-    return type(f"Fast{task_class.__name__}", (FastEnvironment, task_class), rebound_methods(task_class))
+    task_class = with_faster_helpers(ALL_V3_ENVIRONMENTS[f"{task}-v3"])
+    return type(f"Fast{task_class.__name__}", (FastEnvironment, task_class), {})

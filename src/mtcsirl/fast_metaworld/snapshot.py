@@ -16,7 +16,8 @@ class Snapshot:
     none in place.
     """
 
-    def __init__(self, environment: SawyerXYZEnv, observation: np.ndarray) -> None:
+    def take(self, environment: SawyerXYZEnv, observation: np.ndarray) -> None:
+        """Keep the environment's state and its first observation [39]."""
         self._state = np.empty(mujoco.mj_stateSize(environment.model, _STATE))
         mujoco.mj_getState(environment.model, environment.data, self._state, _STATE)
         self._attributes = vars(environment).copy()
