@@ -26,8 +26,8 @@ class SquashedSample(NamedTuple):
     """sigma x noise, which is du / d log_std."""
     slope: Tensor
     """da / du = 1 - a^2."""
-    unclamped: Tensor
-    """1 where log_std lies inside its bounds and so has a gradient, else 0."""
+    inside: Tensor
+    """Whether log_std lies inside its bounds and so has a gradient."""
 
 
 def squashed_sample(head: Tensor, noise: Tensor, min_log_std: float, max_log_std: float) -> SquashedSample:
@@ -38,23 +38,25 @@ def squashed_sample(head: Tensor, noise: Tensor, min_log_std: float, max_log_std
     mean, raw_log_std = head.chunk(2, dim=-1)
     log_std = raw_log_std.clamp(min_log_std, max_log_std)
     deviation = log_std.exp().mul_(noise)
-    action = torch.tanh(mean + deviation)
-    slope = 1.0 - action.square()
-    density = noise.square().mul_(-0.5).sub_(log_std).sub_(torch.log(slope + SQUASH_EPSILON))
-    log_prob = density.sum(-1).sub_(_HALF_LOG_TWO_PI * action.shape[-1])
-    return SquashedSample(action, log_prob, deviation, slope, (log_std == raw_log_std).to(head.dtype))
+    action = torch.add(mean, deviation).tanh_()
+    slope = action.square().neg_().add_(1.0)
+    negative_density = torch.add(slope, SQUASH_EPSILON).log_().add_(log_std).addcmul_(noise, noise, value=0.5)
+    log_prob = negative_density.sum(-1).add_(_HALF_LOG_TWO_PI * action.shape[-1]).neg_()
+    return SquashedSample(action, log_prob, deviation, slope, log_std == raw_log_std)
 
 
-def squashed_sample_gradient(sample: SquashedSample, action_gradient: Tensor, log_prob_gradient: Tensor) -> Tensor:
+def squashed_sample_gradient(
+    sample: SquashedSample, action_gradient: Tensor, log_prob_gradient: Tensor
+) -> Tensor:
     """dL/d head [..., 2 x action], given dL/d action [..., action] and dL/d log_prob [..., 1].
 
     dL/du = (dL/da + dL/dlogp x 2 a / (1 - a^2 + 1e-6)) (1 - a^2);
     dL/dmu = dL/du;  dL/dlog_std = dL/du x sigma x noise - dL/dlogp, where log_std is not clamped.
     """
-    correction = 2.0 * sample.action / (sample.slope + SQUASH_EPSILON)
-    gradient = (action_gradient + log_prob_gradient * correction).mul_(sample.slope)
-    log_std_gradient = (gradient * sample.deviation).sub_(log_prob_gradient).mul_(sample.unclamped)
-    return torch.cat((gradient, log_std_gradient), dim=-1)
+    correction = torch.div(sample.action, sample.slope + SQUASH_EPSILON)
+    mean_gradient = torch.addcmul(action_gradient, correction, log_prob_gradient, value=2.0).mul_(sample.slope)
+    log_std_gradient = torch.mul(mean_gradient, sample.deviation).sub_(log_prob_gradient).mul_(sample.inside)
+    return torch.cat((mean_gradient, log_std_gradient), dim=-1)
 
 
 def squashed_log_prob(head: Tensor, action: Tensor, min_log_std: float, max_log_std: float) -> Tensor:

@@ -45,6 +45,7 @@ class NetworkStack:
         self.parameters = torch.zeros(networks, count, device=device, dtype=dtype)
         self.gradient = torch.zeros_like(self.parameters)
         self.weights, self.biases = self._views(self.parameters)
+        self._transposed = [weight.transpose(1, 2) for weight in self.weights]
         self._weight_gradients, self._bias_gradients = self._views(self.gradient)
 
     def _views(self, flat: Tensor) -> tuple[list[Tensor], list[Tensor]]:
@@ -72,10 +73,10 @@ class NetworkStack:
         activations = workspace.activations
         if inputs is not activations[0]:
             activations[0].copy_(inputs)
-        for layer, (weight, bias) in enumerate(zip(self.weights, self.biases, strict=True)):
+        for layer, (weight, bias) in enumerate(zip(self._transposed, self.biases, strict=True)):
             if layer > 0:
                 activations[layer].relu_()
-            torch.baddbmm(bias, activations[layer], weight.transpose(1, 2), out=activations[layer + 1])
+            torch.baddbmm(bias, activations[layer], weight, out=activations[layer + 1])
         return activations[-1]
 
     def backward(self, output_gradient: Tensor, workspace: Workspace) -> None:

@@ -30,7 +30,7 @@ from mtcsirl.agents.policy import Policy
 if TYPE_CHECKING:
     from mtcsirl.settings import SacSettings
 
-METRICS = ("actor_loss", "critic_loss", "temperature", "entropy", "actor_gradient_norm", "critic_gradient_norm")
+_SUMMED = ("actor_loss", "critic_loss", "temperature", "entropy")
 
 
 class FusedSac:
@@ -87,7 +87,7 @@ class FusedSac:
             )
 
         self.updates = 0
-        self._metric_sums = torch.zeros(len(METRICS), agents, **self._like)
+        self._metric_sums = torch.zeros(len(_SUMMED), agents, **self._like)
         self._metric_updates = 0
         noise_seed = int(np.random.SeedSequence(list(seeds)).generate_state(1, np.uint64)[0] >> 1)
         self._generator = torch.Generator(self.device).manual_seed(noise_seed)
@@ -155,10 +155,7 @@ class FusedSac:
         critic_loss = self._step_critics(observation, action, reward, next_observation, noise[1], temperature)
         actor_loss = self._step_actor(observation, sample, temperature)
         self.target_critics.parameters.lerp_(self.critics.parameters, self.settings.polyak)
-
-        actor_norm = self.actor.gradient.norm(dim=1)
-        critic_norm = self.critics.gradient.norm(dim=1).view(2, -1).norm(dim=0)
-        self._metric_sums += torch.stack((actor_loss, critic_loss, temperature, entropy, actor_norm, critic_norm))
+        self._metric_sums.add_(torch.stack((actor_loss, critic_loss, temperature, entropy)))
 
     def _step_temperature(self, entropy: Tensor) -> None:
         """Loss -log(alpha) x mean(log pi + target entropy), whose gradient in log(alpha) is the entropy gap."""
@@ -182,8 +179,8 @@ class FusedSac:
         target = torch.add(reward, soft_value, alpha=self.settings.discount)
 
         error = self._q_values(self.critics, observation, action) - target
-        error_gradient = (error / error.shape[-1]).flatten(0, 1).unsqueeze(-1)
-        self.critics.backward(error_gradient, self._workspace("critics", error.shape[-1]))
+        minibatch = error.shape[-1]
+        self.critics.backward((error / minibatch).view(-1, minibatch, 1), self._workspace("critics", minibatch))
         self._optimisers["critics"].step()
         return error.square().mean(-1).sum(0).mul_(0.5)
 
@@ -194,18 +191,18 @@ class FusedSac:
         first_is_less = q_values[0] <= q_values[1]
         q_gradient = torch.stack((first_is_less, ~first_is_less)).to(q_values.dtype).mul_(-1.0 / minibatch)
         action_gradient = self.critics.input_gradient(
-            q_gradient.flatten(0, 1).unsqueeze(-1),
+            q_gradient.view(-1, minibatch, 1),
             self._workspace("critics", minibatch),
             columns=slice(observation.shape[-1], None),
         )
         head_gradient = squashed_sample_gradient(
             sample,
-            action_gradient.unflatten(0, (2, self.agents)).sum(0),
+            action_gradient.view(2, self.agents, minibatch, -1).sum(0),
             (temperature / minibatch)[:, None, None],
         )
         self.actor.backward(head_gradient, self._workspace("actor", minibatch))
         self._optimisers["actor"].step()
-        return (temperature[:, None] * sample.log_prob - q_values.amin(0)).mean(1)
+        return (temperature[:, None] * sample.log_prob).sub_(q_values.amin(0)).mean(1)
 
     def _sample_actions(self, role: str, observation: Tensor, noise: Tensor) -> SquashedSample:
         head = self.actor.forward(observation, self._workspace(role, observation.shape[1]))
@@ -214,9 +211,9 @@ class FusedSac:
     def _q_values(self, critics: NetworkStack, observation: Tensor, action: Tensor) -> Tensor:
         """Q values [2, A, B] of both critics of every agent."""
         workspace = self._workspace("critics", observation.shape[1])
-        inputs = workspace.activations[0].unflatten(0, (2, self.agents))
-        inputs[..., : observation.shape[-1]] = observation
-        inputs[..., observation.shape[-1] :] = action
+        inputs = workspace.activations[0].view(2, *observation.shape[:2], -1)
+        inputs[0] = torch.cat((observation, action), dim=-1)
+        inputs[1] = inputs[0]
         return critics.forward(workspace.activations[0], workspace).view(2, self.agents, -1)
 
     def _workspace(self, role: str, minibatch: int) -> Workspace:
@@ -234,13 +231,16 @@ class FusedSac:
         return self.log_temperature.exp()
 
     def metrics(self) -> dict[str, Tensor]:
-        """Means [A] over the updates since the last call; empty if there were none."""
+        """Means [A] over the updates since the last call and the norms of the last gradient; empty without updates."""
         if self._metric_updates == 0:
             return {}
         means = self._metric_sums / self._metric_updates
         self._metric_sums.zero_()
         self._metric_updates = 0
-        return dict(zip(METRICS, means, strict=True))
+        return dict(zip(_SUMMED, means, strict=True)) | {
+            "actor_gradient_norm": self.actor.gradient.norm(dim=1),
+            "critic_gradient_norm": self.critics.gradient.view(2, self.agents, -1).norm(dim=(0, 2)),
+        }
 
     def state_dict(self) -> dict[str, Tensor]:
         """Everything that an exact resume needs, as named tensors (not copies)."""

@@ -26,7 +26,7 @@ from mtcsirl.agents.progress import Progress
 from mtcsirl.agents.relabelling import PolicyReward
 from mtcsirl.agents.replay import Replay
 from mtcsirl.agents.sac import FusedSac
-from mtcsirl.environments import ACTION_SIZE
+from mtcsirl.environments import ACTION_SIZE, OBSERVATION_SIZE
 from mtcsirl.evaluation import Row, evaluate, gate_verdict, measure_episode, stochastic_means
 from mtcsirl.settings import SacSettings
 
@@ -253,10 +253,17 @@ class Training:
         self._log(f"resumed at step {self.step}")
 
 
-def make_learner(agents: int, settings: SacSettings, seeds: Sequence[int]) -> FusedSac | ReferenceSac:
+def make_learner(
+    agents: int,
+    settings: SacSettings,
+    seeds: Sequence[int],
+    *,
+    observation_size: int = OBSERVATION_SIZE,
+    action_size: int = ACTION_SIZE,
+) -> FusedSac | ReferenceSac:
     """The learner that `sac.learner` names."""
     if settings.learner == "stable_baselines3":
         from mtcsirl.agents.reference import ReferenceSac
 
-        return ReferenceSac(agents, settings, seeds=seeds)
-    return FusedSac(agents, settings, seeds=seeds)
+        return ReferenceSac(agents, settings, seeds=seeds, observation_size=observation_size, action_size=action_size)
+    return FusedSac(agents, settings, seeds=seeds, observation_size=observation_size, action_size=action_size)

@@ -1,0 +1,172 @@
+"""SAC gradient updates per second against stock stable-baselines3, at four minibatch sizes.
+
+    python benchmarks/sac_updates.py             the table
+    python benchmarks/sac_updates.py --profile   then, where the time of an update goes
+
+Both learners have the networks of the paper (Table 5) and sample their own replay memory of 10,000 transitions, so an
+update is what a training run pays for one. They take turns in one thread, timed in CPU seconds of that thread, so that
+whatever else the machine does slows both alike. The share of the GEMM peak is the rate at which an update does its
+multiplications, over that of one large matrix product timed in the same turns.
+"""
+
+import argparse
+import os
+from collections.abc import Callable
+from importlib.metadata import version
+from itertools import pairwise
+from statistics import median, quantiles
+from time import thread_time
+from typing import Any
+
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+
+import gymnasium
+import numpy as np
+import torch
+from stable_baselines3 import SAC
+from stable_baselines3.common.logger import Logger
+
+from mtcsirl.agents.replay import Replay
+from mtcsirl.agents.sac import FusedSac
+from mtcsirl.settings import SacSettings
+
+MINIBATCHES = (64, 128, 256, 500)
+TRANSITIONS = 10_000
+OBSERVATION, ACTION = 39, 4
+TURN_SECONDS = 0.25
+GEMM = 1024
+
+
+class Spaces(gymnasium.Env[np.ndarray, np.ndarray]):
+    """Says what Meta-World looks like."""
+
+    observation_space = gymnasium.spaces.Box(-np.inf, np.inf, (OBSERVATION,), np.float32)
+    action_space = gymnasium.spaces.Box(-1.0, 1.0, (ACTION,), np.float32)
+
+
+def measure(minibatches: tuple[int, ...] = MINIBATCHES, rounds: int = 9) -> list[dict[str, Any]]:
+    """Return rows {benchmark, setting, ours, theirs, peer, ratio, ...}: updates a second, medians of rounds.
+
+    The ratio is the median of the rounds' ratios; ratio_low and ratio_high are its quartiles over rounds.
+    """
+    torch.set_num_threads(1)
+    peer = f"stable-baselines3 {version('stable-baselines3')}"
+    rows = []
+    for minibatch in minibatches:
+        turns = (_ours(minibatch), _theirs(minibatch), _gemm())
+        counts = [max(1, round(TURN_SECONDS / _seconds(turn, 3))) for turn in turns]
+        times = np.array(
+            [[_seconds(turn, count) for turn, count in zip(turns, counts, strict=True)] for _ in range(rounds)]
+        )
+        ratios = list(times[:, 1] / times[:, 0])
+        low, _, high = quantiles(ratios, n=4)
+        rate = update_flops(minibatch) / times[:, 0]
+        peak = 2 * GEMM**3 / times[:, 2]
+        rows.append(
+            {
+                "benchmark": "sac_updates",
+                "setting": f"minibatch {minibatch}",
+                "ours": 1 / float(np.median(times[:, 0])),
+                "theirs": 1 / float(np.median(times[:, 1])),
+                "peer": peer,
+                "ratio": median(ratios),
+                "ratio_low": low,
+                "ratio_high": high,
+                "gemm_share": float(np.median(rate / peak)),
+            }
+        )
+    return rows
+
+
+def update_flops(minibatch: int, hidden: tuple[int, ...] = (256, 256)) -> float:
+    """Floating-point operations in the matrix products of one update.
+
+    Forward: actor in s and s', twin target critics, twin critics in the given and in the drawn actions. Backward:
+    weights and inputs of critics and actor, and the inputs alone of the critics in the actor's pass; no first layer
+    needs its inputs' gradient but the last, and that for the actions only.
+    """
+
+    def layers(inputs: int, outputs: int) -> list[int]:
+        sizes = (inputs, *hidden, outputs)
+        return [fan_in * fan_out for fan_in, fan_out in pairwise(sizes)]
+
+    actor, critic = layers(OBSERVATION, 2 * ACTION), layers(OBSERVATION + ACTION, 1)
+    forward = 2 * sum(actor) + 2 * 3 * sum(critic)
+    backward = sum(actor) + sum(actor[1:]) + 2 * (sum(critic) + sum(critic[1:]))
+    through_critics = 2 * (sum(critic[1:]) + ACTION * hidden[0])
+    return 2.0 * minibatch * (forward + backward + through_critics)
+
+
+def _ours(minibatch: int) -> Callable[[], None]:
+    learner, replay = FusedSac(1, SacSettings(), seeds=[0]), Replay(1, TRANSITIONS, seed=0)
+    for observation, action, following, reward in _transitions():
+        replay.add(observation[None], action[None], following[None], np.array([reward]))
+
+    def update() -> None:
+        batch = replay.sample(minibatch)
+        learner.update(batch.observation, batch.action, batch.task_reward, batch.next_observation)
+
+    return update
+
+
+def _theirs(minibatch: int) -> Callable[[], None]:
+    model = SAC(
+        "MlpPolicy", Spaces(), buffer_size=TRANSITIONS, policy_kwargs={"net_arch": [256, 256]}, seed=0, device="cpu"
+    )
+    model.set_logger(Logger(folder=None, output_formats=[]))
+    for observation, action, following, reward in _transitions():
+        model.replay_buffer.add(observation, following, action, reward, np.zeros(1), [{}])
+    return lambda: model.train(1, minibatch)
+
+
+def _transitions() -> zip:
+    random = np.random.default_rng(0)
+    observation, following = random.standard_normal((2, TRANSITIONS, OBSERVATION)).astype(np.float32)
+    action = random.uniform(-1, 1, (TRANSITIONS, ACTION)).astype(np.float32)
+    return zip(observation, action, following, random.uniform(0, 10, TRANSITIONS), strict=True)
+
+
+def _gemm() -> Callable[[], None]:
+    left, right, out = (torch.randn(GEMM, GEMM) for _ in range(3))
+    return lambda: torch.mm(left, right, out=out)
+
+
+def _seconds(call: Callable[[], Any], count: int) -> float:
+    """CPU seconds of this thread for one call, the mean of `count`."""
+    started = thread_time()
+    for _ in range(count):
+        call()
+    return (thread_time() - started) / count
+
+
+def profile(minibatch: int, updates: int = 100) -> str:
+    """The operators of our update by the time they spend themselves."""
+    update = _ours(minibatch)
+    update()
+    with torch.profiler.profile(record_shapes=True) as record:
+        for _ in range(updates):
+            update()
+    events = record.key_averages(group_by_input_shape=True)
+    return str(events.table(sort_by="self_cpu_time_total", row_limit=15, max_shapes_column_width=60))
+
+
+def main() -> None:
+    """Print the table, on request the profile."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--rounds", type=int, default=9, help="turns of each learner (default 9)")
+    parser.add_argument("--profile", action="store_true", help="show where the time of an update goes")
+    arguments = parser.parse_args()
+    print(f"{'minibatch':>10}{'ours':>8}{'theirs':>8}{'ratio':>7}{'quartiles':>13}{'GEMM peak':>11}")
+    for minibatch in MINIBATCHES:
+        (row,) = measure((minibatch,), arguments.rounds)
+        print(
+            f"{minibatch:>10}{row['ours']:>8.1f}{row['theirs']:>8.1f}{row['ratio']:>7.2f}"
+            f"{row['ratio_low']:>8.2f}-{row['ratio_high']:.2f}{row['gemm_share']:>10.0%}",
+            flush=True,
+        )
+    if arguments.profile:
+        print(profile(128))
+
+
+if __name__ == "__main__":
+    main()
