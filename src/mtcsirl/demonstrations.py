@@ -65,22 +65,6 @@ def as_transitions(frame: pd.DataFrame, observation: str) -> Transitions:
     )
 
 
-def members_of(files: Sequence[Path | str]) -> tuple[tuple[str, int], ...]:
-    """The (task, target) of each file of demonstrations.
-
-    Raises:
-        UserError: a file is missing or truncated, lacks a column, or mixes tasks or targets.
-    """
-    members = []
-    for file in files:
-        frame = read_parquet(file, COLUMNS)
-        found = {(str(task), int(target)) for task, target in zip(frame["task"], frame["target"], strict=True)}
-        if len(found) != 1:
-            raise UserError(f"{file}: holds {len(found)} tasks or targets; give one file per task and target")
-        members.append(found.pop())
-    return tuple(members)
-
-
 class Demonstrations(NamedTuple):
     """The demonstrations of T tasks."""
 

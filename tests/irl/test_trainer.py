@@ -224,6 +224,15 @@ def test_a_checkpoint_of_other_settings_or_a_broken_one_is_not_taken_up(demonstr
         assert all(checksum(whole / file) == checksum(folder / file) for file in FILES)
 
 
+def test_the_reference_learner_trains_too(demonstrations) -> None:
+    settings = irl_settings()
+    reference = settings.sac.model_copy(update={"learner": "stable_baselines3"})
+    settings = settings.model_copy(update={"sac": reference})
+    trainer = _run(make_trainer("mt_csirl", "velocity", demonstrations, 100, settings))
+    assert trainer.method.discriminators["f"].network.parameters.isfinite().all()
+    assert all(row["value"] == row["value"] for row in trainer.curve)
+
+
 def test_unknown_names_are_one_clear_line(demonstrations, tmp_path) -> None:
     with pytest.raises(UserError, match="method: unknown 'gail'"):
         learn_reward(tmp_path, "gail", "velocity", demonstrations, 100, irl_settings())

@@ -8,7 +8,7 @@ from torch import Tensor
 
 from mtcsirl.agents.lockstep import Outcome
 from mtcsirl.agents.replay import Replay
-from mtcsirl.agents.sac import FusedSac
+from mtcsirl.agents.training import make_learner
 from mtcsirl.irl.curriculum import Curriculum
 from mtcsirl.irl.diagnostics import (
     Row,
@@ -53,7 +53,7 @@ class IrlTrainer:
         tasks, steps = len(world.members), self.irl.steps_per_iteration
         *seeds, own, replayed = (int(n) for n in np.random.SeedSequence(seed).generate_state(tasks + 2))
         state, action = demonstrations.observation.shape[-1], demonstrations.action.shape[-1]
-        self.sac = FusedSac(tasks, settings.sac, seeds=seeds, observation_size=state, action_size=action)
+        self.sac = make_learner(tasks, settings.sac, seeds, observation_size=state, action_size=action)
         capacity = min(self.irl.generator_memory, self.iterations * steps)
         self.replay = Replay(tasks, capacity, seed=replayed, observation_size=state, action_size=action)
         self.curriculum = Curriculum(tasks, self.irl.curriculum_window)
@@ -88,8 +88,8 @@ class IrlTrainer:
     # --- generators ---------------------------------------------------------------------------------------------
 
     def _act(self, observation: np.ndarray) -> np.ndarray:
-        if self.replay.size < self.settings.sac.random_steps:
-            shape = (len(observation), self.sac.action_size)
+        if self.replay.size < min(self.settings.sac.random_steps, self.replay.capacity):
+            shape = (len(observation), self._demonstrations.action.shape[-1])
             return (2.0 * torch.rand(shape, generator=self._random) - 1.0).numpy()
         return self.sac.act(torch.from_numpy(observation).float()).numpy()
 
