@@ -5,7 +5,6 @@ from pathlib import Path
 
 from mtcsirl.commands.arguments import Verbs, add_study_settings, add_verb, study_settings
 from mtcsirl.design import ARTEFACTS, design
-from mtcsirl.errors import UserError
 
 
 def register(verbs: Verbs) -> None:
@@ -71,7 +70,19 @@ def _figure(parsed: argparse.Namespace) -> None:
 
 
 def _claims(parsed: argparse.Namespace) -> None:
-    raise UserError("claims: not built yet")
+    from mtcsirl.analysis.claims import claims_json, claims_markdown, judge
+    from mtcsirl.analysis.rows import evaluation_rows, score_rows
+    from mtcsirl.storage import write_json, write_text
+
+    settings = study_settings(parsed)
+    study = design(settings)
+    rows = evaluation_rows(study, settings.results, partial=parsed.partial)
+    findings = judge(rows, score_rows(study, settings.results, partial=parsed.partial), settings)
+    folder = parsed.output or Path(settings.results) / "claims"
+    text = claims_markdown(findings, settings)
+    write_json(folder / "claims.json", claims_json(findings, settings))
+    write_text(folder / "claims.md", text)
+    print(text)
 
 
 def _report(parsed: argparse.Namespace) -> None:

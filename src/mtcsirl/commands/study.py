@@ -56,7 +56,7 @@ def register(verbs: Verbs) -> None:
         verbs,
         "settings",
         _settings,
-        does="print the configuration (template: with comments; json; schema; defaults: as the classes have it) or check it",
+        does="print the configuration (template: with comments; defaults: the classes') or check it",
         needs="nothing",
         writes="nothing",
     )
