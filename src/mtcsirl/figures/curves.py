@@ -89,15 +89,16 @@ def draw_curves(axes: Axes, series: Sequence[Series], metric: str, target: float
         axes.annotate(
             f"target {target:g}", (1, target), xycoords=("axes fraction", "data"), xytext=(0, 2),
             textcoords="offset points", ha="right", va="bottom", color=TARGET_COLOUR, fontsize=6.5,
+            bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.6, "pad": 0.5},
         )  # fmt: skip
-    if all(one.rows.empty for one in series):
-        empty_panel(axes, NO_RUNS if any(one.expected for one in series) else NOT_ASKED)
     axes.set_ylim(0, 1.2 * max(heights, default=1.0))
     axes.set_xlim(left=0)
     axes.set_xlabel("environment steps")
     axes.set_ylabel(quantity_label(metric))
     axes.xaxis.set_major_formatter(lambda step, _: f"{step / 1000:g}k" if step else "0")
     axes.locator_params(axis="x", nbins=4)
+    if all(one.rows.empty for one in series):
+        empty_panel(axes, NO_RUNS if any(one.expected for one in series) else NOT_ASKED)
 
 
 def add_legend(figure: Figure, axes: list[Axes]) -> None:

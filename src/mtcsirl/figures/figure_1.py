@@ -50,7 +50,7 @@ def draw(data: FigureData) -> Figure:
 def caption(data: FigureData) -> str:
     """What the figure shows."""
     return (
-        "MT-CSIRL architecture overview. Each of T tasks has demonstrations of its expert, its own policy (generator) "
+        "Each of T tasks has demonstrations of its expert, its own policy (generator) "
         "and its known task reward; the task discriminators share one network f, the common-sense reward. D_updates "
         "times per iteration each discriminator learns to tell expert from generator transitions, which updates f; "
         "G_updates times the policy is updated with the task reward plus alpha f, where alpha is the curriculum "

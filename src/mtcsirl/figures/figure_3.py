@@ -47,8 +47,8 @@ def caption(data: FigureData) -> str:
     numbers = "; ".join(f"{quantity(metric)}: {counts(multi_task.curve_series(data, metric))}" for metric in metrics)
     found = multi_task.correlation(data, _SCATTER)
     return (
-        f"Ground-truth cs-reward on tasks that IRL has not seen ({', '.join(data.settings.multi_task.unseen_tasks)}; "
-        f"mean over them). {letters}: Expert maximises r_task and the true cs-reward, MT-CSIRL r_task and the reward "
+        f"Tasks that IRL has not seen ({', '.join(data.settings.multi_task.unseen_tasks)}), mean over them. "
+        f"{letters}: Expert maximises r_task and the true cs-reward, MT-CSIRL r_task and the reward "
         f"learned from {', '.join(data.settings.multi_task.train_tasks)}, SAC r_task alone; training episodes of the "
         "stochastic policy. Red line: target. Lines and bands: mean and 95 % t-interval over seeds "
         f"({numbers}); bands are cut off at the frame. ({chr(ord('a') + len(metrics))}) "

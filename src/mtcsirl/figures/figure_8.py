@@ -110,7 +110,7 @@ def caption(data: FigureData) -> str:
     """What the figure shows."""
     several = data.settings.multi_task
     return (
-        "Train and test tasks of the three experiments. Single target: the reward is learned and tried on the same "
+        "Single target: the reward is learned and tried on the same "
         f"task and target; it is repeated for {', '.join(data.settings.single_target.tasks)}. Multi target: learned "
         f"from {len(data.settings.multi_target.train_targets)} targets of one task (here "
         f"{data.settings.multi_target.tasks[0]}; repeated for each task), tried on a new target of every task. "

@@ -64,6 +64,6 @@ def compose(picture: Image, tip: NDArray[np.float64], notes: Sequence[str] = ())
 def caption(data: FigureData) -> str:
     """What the figure shows."""
     return (
-        "Sawyer robot: the end effector, whose speed |l(s') - l(s)| / 0.0125 s is the velocity, is marked with an "
+        "The end effector, whose speed |l(s') - l(s)| / 0.0125 s is the velocity, is marked with an "
         "arrow. The arrow's tip is the 3-D position in entries 0 to 2 of the observation, projected through the camera."
     )

@@ -95,6 +95,7 @@ def draw_scatter(axes: Axes, found: Correlation, method: str, cs_reward: str) ->
     axes.set_xlabel(f"true cs-reward ({quantity(cs_reward)})")
     axes.set_ylabel("learned cs-reward\n(standardised per seed)")
     if found.points.empty:
+        axes.set_yticks([])
         empty_panel(axes, NO_RUNS)
         return
     standard = standardise(found.points)
@@ -108,12 +109,12 @@ def draw_scatter(axes: Axes, found: Correlation, method: str, cs_reward: str) ->
         axes.plot(ends, slope * ends + offset, color="black", linewidth=1, linestyle="--")
     low, high = np.percentile(standard["learned"], [0.2, 99.8])
     margin = 0.08 * max(high - low, 1e-6)
-    axes.set_ylim(low - margin, high + 5 * margin)
-    words = f"{found.words()}\n{found.transition_name}, {found.counts()}"
+    axes.set_ylim(low - margin, high + 6 * margin)
+    words = f"{found.words()}\n{found.transition_name}\n{found.counts()}"
     axes.text(
         0.03, 0.98, words, transform=axes.transAxes, va="top", fontsize=6.5,
         bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1},
-    )  # fmt: skip
+    ).set_in_layout(False)  # fmt: skip
 
 
 def standardise(points: pd.DataFrame) -> pd.DataFrame:
@@ -136,6 +137,8 @@ def scatter_caption(found: Correlation, cs_reward: str) -> str:
     """What a scatter shows: set, number of points and seeds, correlation with its interval."""
     interval = "95 % t-interval over seeds on Fisher's z scale" if found.estimate.n > 1 else "95 % bootstrap interval"
     paper = "" if np.isnan(found.paper) else f" (paper: {found.paper:.2f})"
+    if found.points.empty and np.isnan(found.estimate.value):
+        return f"True against learned {quantity(cs_reward)} cs-reward{paper}: {NO_RUNS}."
     return (
         f"True against learned {quantity(cs_reward)} cs-reward on {found.transition_name}: "
         f"Pearson {found.words()}{paper}, {interval}, {found.counts()} with up to {found.per_seed:,} transitions each; "

@@ -87,7 +87,7 @@ def caption(data: FigureData, artefact: str, task: str, metrics: list[str], *, s
         f"{quantity(metric)}: {counts(curve_series(data, artefact, task, metric))}" for metric in metrics
     )
     text = (
-        f"Single task cs-reward, {task}, same task and target throughout. {letters}: the agent during IRL "
+        f"Learned from {task} with one target and tried on the same. {letters}: the agent during IRL "
         "(IRL agent), a new agent trained from scratch on r_task + the learned cs-reward (Transferred) and an agent "
         "without any cs-reward (SAC), training episodes of the stochastic policy. Red line: target. "
         f"Lines and bands: mean and 95 % t-interval over seeds ({numbers}); bands are cut off at the frame."

@@ -126,8 +126,9 @@ def caption_of(png: bytes) -> str:
 
 
 def add_notes(figure: Figure, notes: Sequence[str]) -> None:
-    """Write notes under the panels: what is missing, the scale."""
+    """Write notes under the panels, which keep their size: what is missing, the scale."""
     if notes:
+        figure.set_figheight(figure.get_figheight() + 0.14 * len(notes))
         figure.supxlabel("\n".join(notes), fontsize=6.5, color=NOTE_COLOUR)
 
 
@@ -138,6 +139,7 @@ def scale_notes(scale: str) -> list[str]:
 
 def empty_panel(axes: Axes, reason: str) -> None:
     """Say in an empty panel why it is empty."""
+    axes.set_xticks([])
     axes.text(0.5, 0.5, reason, transform=axes.transAxes, ha="center", va="center", color=NOTE_COLOUR)
 
 
