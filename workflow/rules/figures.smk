@@ -1,6 +1,14 @@
 """The paper's figures: targets figure_1 ... figure_9, figure_s1, figure_s2, each as PDF and PNG."""
 
 FIGURES = [name for name in ARTEFACTS if name.startswith("figure_")]
+# What a figure that is drawn from no run depends on.
+STUDY_KEYS = {"scale", "results", "figures", "single_target", "multi_target", "multi_task", "environment"}
+
+
+def figure_settings(figure):
+    """The configuration, or of it what ``figure`` depends on."""
+    return as_json(SETTINGS, None if rows_of(figure) else STUDY_KEYS)
+
 
 for figure in FIGURES:
 
@@ -18,7 +26,7 @@ for figure in FIGURES:
         threads: 1
         params:
             number=figure.removeprefix("figure_"),
-            settings=as_json(SETTINGS),
+            settings=figure_settings(figure),
             folder=subpath(output.pdf, parent=True),
         shell:
             "mtcsirl figure {params.number:q} --settings {params.settings:q} --output {params.folder:q} > {log:q} 2>&1"

@@ -65,9 +65,10 @@ def template(settings: Settings | None = None) -> str:
     return HEAD + "\n".join(_lines(settings or Settings(), "")) + "\n"
 
 
-def as_json(settings: BaseModel) -> str:
-    """``settings`` as one line of JSON with sorted keys: equal settings give equal text."""
-    return json.dumps(settings.model_dump(mode="json"), sort_keys=True, separators=(",", ":"), allow_nan=False)
+def as_json(settings: BaseModel, only: set[str] | None = None) -> str:
+    """``settings`` (their keys ``only``) as one line of JSON with sorted keys: equal settings give equal text."""
+    data = settings.model_dump(mode="json", include=only)
+    return json.dumps(data, sort_keys=True, separators=(",", ":"), allow_nan=False)
 
 
 def schema() -> dict[str, Any]:

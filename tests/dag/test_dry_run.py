@@ -1,0 +1,76 @@
+"""Every target can be planned at every scale, with as many jobs as the design says, and quickly."""
+
+import time
+from pathlib import Path
+
+import pytest
+
+from mtcsirl.design import ARTEFACTS, design
+from mtcsirl.settings.loading import load
+from tests.dag.conftest import Snakemake, job_counts
+
+PAPER_SECONDS = 30
+"""The longest that planning the paper's scale may take."""
+
+
+def dry_run(snakemake: Snakemake, scale: str, *targets: str) -> dict[str, int]:
+    overlay = () if scale == "desk" else ("--configfile", f"config/{scale}.yaml")
+    return job_counts(snakemake("-n", "--quiet", "rules", *targets, *overlay))
+
+
+@pytest.mark.parametrize("target", ARTEFACTS)
+@pytest.mark.parametrize("scale", ["desk", "paper"])
+def test_an_artefact_plans_the_jobs_that_the_design_says(snakemake: Snakemake, scale: str, target: str) -> None:
+    assert dry_run(snakemake, scale, target) == design(load(scale=scale), target).jobs() | {target: 1}
+
+
+@pytest.mark.parametrize("scale", ["smoke", "desk", "paper"])
+def test_all_is_the_whole_study_with_every_artefact(snakemake: Snakemake, scale: str) -> None:
+    start = time.monotonic()
+    planned = dry_run(snakemake, scale)
+    assert time.monotonic() - start < PAPER_SECONDS
+    artefacts = dict.fromkeys([*ARTEFACTS, "claims", "report", "all"], 1)
+    assert planned == design(load(scale=scale)).jobs() | artefacts
+
+
+@pytest.mark.parametrize("target", ["claims", "report", "all"])
+def test_collecting_targets_need_the_whole_study(snakemake: Snakemake, target: str) -> None:
+    planned = dry_run(snakemake, "smoke", target)
+    assert planned.items() >= design(load(scale="smoke")).jobs().items()
+    assert planned[target] == 1
+
+
+def test_a_run_can_be_asked_for_by_its_path(snakemake: Snakemake) -> None:
+    planned = dry_run(snakemake, "desk", "results/expert/velocity/reach-t1/s0/gate.json")
+    assert planned == {"train_expert": 1}
+
+
+def test_a_run_outside_the_study_is_refused(snakemake: Snakemake) -> None:
+    done = snakemake("-n", "results/expert/velocity/reach-t1/s7/gate.json")
+    assert done.returncode != 0
+    assert "expert/velocity/reach-t1/s7 is no run of the study at scale desk" in done.stderr
+
+
+BAD = {
+    "unknown key": ("sac={minibach: 3}", "sac.minibach = 3: unknown key, did you mean minibatch?"),
+    "unknown section": ("sack={}", "sack: unknown key"),
+    "wrong type": ("sac={minibatch: many}", "sac.minibatch = 'many': must be a valid integer"),
+    "unknown task": ("single_target={tasks: [fly]}", "unknown task 'fly'; allowed: "),
+    "unknown method": ("methods=[gail]", "unknown method 'gail'; allowed: mt_airl, "),
+    "unknown cs-reward": ("cs_rewards=[speed]", "unknown common-sense reward 'speed'; allowed: velocity, action_norm"),
+    "empty list": ("seeds=[]", "seeds = []: must not be empty"),
+    "negative budget": ("expert={steps: {default: -1}}", "expert.steps.default = -1: must be greater than 0"),
+}
+
+
+@pytest.mark.parametrize("mistake", BAD)
+def test_a_bad_configuration_is_one_line_and_leaves_no_trace(
+    snakemake: Snakemake, tmp_path: Path, mistake: str
+) -> None:
+    value, says = BAD[mistake]
+    done = snakemake("--cores", "1", "--config", value, cwd=tmp_path)
+    assert done.returncode != 0
+    (line,) = [line for line in done.stderr.splitlines() if line.startswith("configuration:")]
+    assert says in line
+    assert "Traceback" not in done.stderr
+    assert not list(tmp_path.iterdir()), "nothing is written"
