@@ -19,11 +19,10 @@ class Progress:
     """Collects the metrics of finished episodes; logs their means every few seconds."""
 
     def __init__(self, steps: int, log: Callable[[str], None], events: Path | str | None = None) -> None:
-        self.seconds = 0.0
-        """Training time of earlier tries of this run."""
         self._steps, self._log = steps, log
         self._writer = None if events is None else _event_writer(events)
         self._pending: list[dict[str, float]] = []
+        self.start(0)
 
     def start(self, step: int) -> None:
         """Begin to measure speed at this step."""

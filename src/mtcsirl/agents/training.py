@@ -95,7 +95,7 @@ class Training:
         self._progress.start(self.step)
         while self.step < self.settings.steps:
             started = self.step
-            self._episode()
+            self.episode()
             last = self.step == self.settings.steps
             if self.settings.progress.select_episodes > 0 and (
                 last or self._crossed(started, self.settings.progress.select_every)
@@ -125,7 +125,7 @@ class Training:
     def _crossed(self, started: int, every: int) -> bool:
         return self.step // every > started // every
 
-    def _episode(self) -> None:
+    def episode(self) -> None:
         """Train through one episode of all agents, then report it."""
         observation, started = self.environments.reset(), self.step
         solved = np.zeros(len(self.jobs), dtype=bool)
@@ -228,7 +228,6 @@ class Training:
             "random": self._random.bit_generator.state,
             "curves": self._curves,
             "scores": [None if best is None else best[0] for best in self._best],
-            "seconds": self._progress.seconds,
         }
         save_checkpoint(file, tensors, notes)
 
@@ -249,7 +248,6 @@ class Training:
                 self._best[agent] = (tuple(score), self._policy(agent).with_tensors(weights))
         self.step, self._random.bit_generator.state = notes["step"], notes["random"]
         self._curves = [[(step, name, value) for step, name, value in curve] for curve in notes["curves"]]
-        self._progress.seconds = notes["seconds"]
         self._log(f"resumed at step {self.step}")
 
 
