@@ -30,8 +30,8 @@ def made_up_report(scale: str = "desk", **changes) -> ReportData:
             machines=("Some Processor 9000 @ 2.50GHz, 2 cores, Linux-6.1, Python 3.11.7",),
             versions={"metaworld": "3.1.1", "torch": "2.13.0"},
             stages=(
-                StageCost("train_expert", 120, 130, 8.5, 612.0),
-                StageCost("train_sac", 50, 50, 3.25, 590.4),
+                StageCost("train_expert", 120, 130, 30_600.0, 612.0),
+                StageCost("train_sac", 50, 50, 11_700.0, 590.4),
             ),
         ),
         claims=tuple(

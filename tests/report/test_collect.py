@@ -57,6 +57,7 @@ def results(tmp_path_factory):
                 root / "results" / run.folder / "gate.json", gate | ({"members": members} if members else {})
             )
     png = figure_bytes(new_figure(1, 1), "png", "what it shows, n = 1 seed")
+    storage.write_bytes(root / "results" / "tables" / "table_1.png", png)
     for name in ARTEFACTS:
         if name.startswith("table_"):
             for ending in ("md", "csv", "tex"):
@@ -81,9 +82,10 @@ def test_whole_study(results):
         stage: (number, number) for stage, number in jobs.items()
     }
     experts = data.run.stages[0]
-    assert experts.cpu_hours == pytest.approx(0.2 * jobs["train_expert"])
+    assert experts.cpu_seconds == pytest.approx(720 * jobs["train_expert"])
     assert experts.peak_memory_mib == 500.5
     assert [table.name for table in data.tables] == [f"table_{n}" for n in range(1, 6)]
+    assert [table.name for table in data.tables if table.picture] == ["table_1"]
     assert [figure.name for figure in data.figures] == [name for name in ARTEFACTS if name.startswith("figure_")]
     assert {figure.caption for figure in data.figures} == {"what it shows, n = 1 seed"}
 

@@ -74,7 +74,7 @@ def test_text_is_escaped_once(page):
 
 
 def test_numbers_of_the_run(page):
-    for text in ("0123456789abcdef", "Some Processor 9000", "120 of 130", "170 of 180", "11.75", "612"):
+    for text in ("0123456789ab", "Some Processor 9000", "120 of 130", "170 of 180", "8.5 h", "11.8 h", "612"):
         assert text in page
 
 
@@ -111,6 +111,30 @@ def test_unknown_numbers_are_dashes():
     page = build_report(replace(data, gates=(replace(data.gates[0], success=float("nan"), metric=None),)))
     assert page.count("<td>–</td>") == 2
     assert "nan" not in page.lower().split("<h2>gates</h2>")[1].split("</table>")[0]
+
+
+def test_heat_map_and_summary_show_where_they_exist():
+    data = made_up_report()
+    picture = replace(data.figures[0], name="claims_picture", caption="Twelve verdicts")
+    heat_map = replace(picture, name="table_1_picture", caption="Ours and the paper's")
+    page = build_report(replace(data, claims_picture=picture, tables=(replace(data.tables[0], picture=heat_map),)))
+    assert page.index("Which claims hold") < page.index("Twelve verdicts") < page.index('id="claim-C1"')
+    assert page.index('id="table_1"') < page.index("Ours and the paper&#39;s") < page.index('id="figures"')
+
+
+def test_durations_are_readable():
+    data = made_up_report()
+    stages = tuple(replace(data.run.stages[0], cpu_seconds=seconds) for seconds in (12.0, 720.0))
+    page = build_report(replace(data, run=replace(data.run, stages=stages)))
+    assert "<td>12 s</td>" in page
+    assert page.count("<td>12 min</td>") == 2
+
+
+def test_changes_that_were_not_committed_are_told(page):
+    data = made_up_report()
+    dirty = build_report(replace(data, run=replace(data.run, commits=("0123456789abcdef+",))))
+    assert "<code>0123456789ab+</code> (+: with changes not committed)" in dirty
+    assert "not committed" not in page
 
 
 def test_equal_data_gives_equal_text(page):

@@ -42,8 +42,10 @@ def draw(data: FigureData) -> Figure:
     for row in ("demonstrations", "discriminator", "reward", "generator"):
         axes.text(0.62, _ROWS[row], r"$\cdots$", ha="center", va="center", fontsize=12, color=INK)
     _legend(axes)
-    for note in scale_notes(data.settings.scale):
-        axes.text(0.5, 0.945, note, ha="center", fontsize=6.5, color=NOTE_COLOUR)
+    notes = scale_notes(data.settings.scale)
+    if notes:
+        axes.set_ylim(-0.15, 0.96)
+        axes.text(0.5, -0.13, notes[0], ha="center", fontsize=6.5, color=NOTE_COLOUR)
     return figure
 
 

@@ -55,6 +55,7 @@ def collect(settings: Settings, page: Path, *, partial: bool = False) -> ReportD
         targets=(*((name, _title(name)) for name in ARTEFACTS), *SUMMARY_TARGETS),
         missing=tuple(missing),
         links=_links(page, (("verdicts as data", results / "claims" / "claims.json"),)),
+        claims_picture=_optional_picture("claims_picture", "All verdicts", results / "claims" / "claims.png"),
     )
 
 
@@ -83,7 +84,8 @@ def _table(name: str, settings: Settings, page: Path) -> TableView:
     path = _picture_or_table(name, settings)
     table = parse_table(storage.read_text(path), path)
     files = ((ending.upper(), path.with_suffix(f".{ending}")) for ending in ("csv", "md", "tex"))
-    return TableView(name, table.caption, table.head, table.rows, table.notes, _links(page, tuple(files)))
+    picture = _optional_picture(f"{name}_picture", "as a heat map", path.with_suffix(".png"))
+    return TableView(name, table.caption, table.head, table.rows, table.notes, _links(page, tuple(files)), picture)
 
 
 def _figure(name: str, settings: Settings, page: Path) -> FigureView:
@@ -91,6 +93,14 @@ def _figure(name: str, settings: Settings, page: Path) -> FigureView:
     png = storage.read_bytes(path)
     links = _links(page, (("PDF", path.with_suffix(".pdf")), ("PNG", path)))
     return FigureView(name, _title(name), caption_of(png), png, links)
+
+
+def _optional_picture(name: str, title: str, path: Path) -> FigureView | None:
+    """A picture that not every study has."""
+    if not path.is_file():
+        return None
+    png = storage.read_bytes(path)
+    return FigureView(name, title, caption_of(png), png)
 
 
 def _links(page: Path, files: tuple[tuple[str, Path], ...]) -> tuple[tuple[str, str], ...]:
@@ -125,7 +135,7 @@ def _stage_cost(stage: str, study: Study, provenance: dict[Run, dict[str, Any]])
         stage=stage,
         done=len(costs),
         planned=study.jobs().get(stage, 0),
-        cpu_hours=sum(cost["cpu_seconds"] for cost in costs) / 3600,
+        cpu_seconds=sum(cost["cpu_seconds"] for cost in costs),
         peak_memory_mib=max((cost["peak_memory_mib"] for cost in costs), default=0.0),
     )
 

@@ -10,7 +10,7 @@ class StageCost:
     stage: str
     done: int
     planned: int
-    cpu_hours: float
+    cpu_seconds: float
     peak_memory_mib: float
 
 
@@ -49,6 +49,8 @@ class TableView:
     rows: tuple[tuple[str, ...], ...]
     notes: tuple[str, ...]
     links: tuple[tuple[str, str], ...] = ()
+    picture: "FigureView | None" = None
+    """The table as a heat map, where there is one."""
 
 
 @dataclass(frozen=True)
@@ -99,3 +101,5 @@ class ReportData:
     """(target, what it makes): how to rerun each item."""
     missing: tuple[tuple[str, str], ...] = ()
     links: tuple[tuple[str, str], ...] = ()
+    claims_picture: FigureView | None = None
+    """All verdicts on one page, where it has been drawn."""

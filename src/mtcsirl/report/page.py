@@ -27,7 +27,13 @@ def build_report(data: ReportData) -> str:
     environment = Environment(
         loader=FunctionLoader(_file), autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
-    environment.filters |= {"picture": _picture, "strong": _strong, "number": _number, "title": _title}
+    environment.filters |= {
+        "picture": _picture,
+        "strong": _strong,
+        "number": _number,
+        "title": _title,
+        "duration": _duration,
+    }
     return environment.get_template("page.html").render(
         data=data,
         css=Markup(_file("page.css")),
@@ -56,6 +62,13 @@ def _strong(text: str) -> Markup:
 
 def _number(value: float | None, digits: int = 2) -> str:
     return "–" if value is None or value != value else f"{value:.{digits}f}"
+
+
+def _duration(seconds: float) -> str:
+    """As in ``35 s``, ``12 min``, ``3.4 h``."""
+    if seconds < 100:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60:.0f} min" if seconds < 6000 else f"{seconds / 3600:.1f} h"
 
 
 def _title(name: str) -> str:
