@@ -17,7 +17,7 @@ END = {"claims": 1, "report": 1, "all": 1}
 
 
 def plan(snakemake: Snakemake, *arguments: str) -> dict[str, int]:
-    return job_counts(snakemake("-n", "--quiet", "rules", "all", *SMOKE, *arguments))
+    return job_counts(snakemake("-n", "all", "--quiet", "rules", *SMOKE, *arguments))
 
 
 def test_a_second_run_has_nothing_to_do(smoke: Path, snakemake: Snakemake) -> None:

@@ -1,0 +1,262 @@
+"""The command line: every verb explains itself, and every mistake is one line and exit code 2."""
+
+import argparse
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from mtcsirl import cli, storage
+from mtcsirl.commands.arguments import run_settings
+from mtcsirl.design import design
+from mtcsirl.outputs import OUTPUTS
+from mtcsirl.plan import Rates, cost, load_rates, plan, wall_hours
+from mtcsirl.settings import Settings
+from mtcsirl.settings.loading import load
+from mtcsirl.settings.runs import AgentRunSettings, expert_run
+from mtcsirl.status import DONE, FAILED, OUTDATED, RUNNING, WAITING, run_status, seconds_left, study_status
+from mtcsirl.study import Expert
+
+KEY = ["--task", "reach", "--seed", "0"]
+
+
+def verbs() -> list[str]:
+    (action,) = (a for a in cli.parser()._actions if isinstance(a, argparse._SubParsersAction))
+    return list(action.choices)
+
+
+def fails(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
+    """The one line that a wrong call prints."""
+    assert cli.main(arguments) == 2
+    error = capsys.readouterr().err
+    assert error.count("\n") == 1
+    assert error.startswith("mtcsirl: ")
+    return error
+
+
+@pytest.mark.parametrize("verb", verbs())
+def test_help_says_what_it_does_needs_and_writes(verb: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as stopped:
+        cli.main([verb, "--help"])
+    assert stopped.value.code == 0
+    text = capsys.readouterr().out
+    assert re.search(r"^needs:  \w", text, re.MULTILINE)
+    assert re.search(r"^writes: \S", text, re.MULTILINE)
+
+
+def test_every_rule_has_a_verb_and_every_stage_a_rule(checkout: Path) -> None:
+    rules = "".join(path.read_text() for path in (checkout / "workflow/rules").glob("*.smk"))
+    used = set(re.findall(r'"mtcsirl ([a-z-]+)', rules))
+    assert used <= set(verbs())
+    assert {stage.replace("_", "-") for stage in OUTPUTS} <= used
+    assert {"table", "figure", "claims", "report"} <= used
+
+
+def test_the_library_knows_neither_snakemake_nor_argparse(checkout: Path) -> None:
+    for path in (checkout / "src").rglob("*.py"):
+        text = path.read_text()
+        assert not re.search(r"^\s*(import|from) snakemake", text, re.MULTILINE), path
+        if "commands" not in path.parts and path.name != "cli.py":
+            assert "argparse" not in text, path
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (["fly"], "invalid choice: 'fly'"),
+        ([], "the following arguments are required: VERB"),
+        (["train-sac", "--task", "fly", "--seed", "0", "--output", "x"], "unknown task 'fly'; allowed: assembly, "),
+        (["train-sac", "--task", "reach", "--seed", "-1", "--output", "x"], "--seed"),
+        (["train-sac", *KEY, "--target", "50", "--output", "x"], "target '50': must be 0 ... 49"),
+        (["train-expert", *KEY, "--cs-reward", "speed", "--output", "x"], "unknown common-sense reward 'speed'"),
+        (["train-sac", *KEY, "--output", "x", "--set", "sac.minibach=3"], "sac.minibach = 3: unknown key"),
+        (["train-sac", *KEY, "--output", "x", "--set", "steps=0"], "steps = 0: must be greater than 0"),
+        (["train-sac", *KEY, "--output", "x", "--settings", "{"], "--settings: not valid JSON"),
+        (["train-sac", *KEY, "--output", "x", "--settings", "nowhere.json"], "nowhere.json: no such file"),
+        (
+            ["transfer", *KEY, "--cs-reward", "velocity", "--reward", "nowhere", "--output", "x"],
+            "nowhere: no such folder",
+        ),
+        (["figure", "99"], "invalid choice: '99'"),
+        (["plan", "--target", "figure_99"], "unknown artefact 'figure_99'; allowed: table_1, "),
+        (["learn-reward", "--method", "gail"], "unknown method 'gail'; allowed: mt_airl, "),
+        (["table", "2"], "evaluation.csv: this run is missing"),
+    ],
+    ids=lambda value: " ".join(value[:4]) if isinstance(value, list) else "",
+)
+def test_a_mistake_is_one_line(
+    arguments: list[str], says: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert says in fails(capsys, *arguments)
+    assert not list(tmp_path.iterdir()), "nothing is written"
+
+
+def test_settings_of_a_run_come_from_the_desk_scale_unless_given(monkeypatch: pytest.MonkeyPatch) -> None:
+    def of(*arguments: str) -> AgentRunSettings:
+        parsed = cli.parser().parse_args(["train-expert", *KEY, "--cs-reward", "velocity", "--output", "x", *arguments])
+        return run_settings(parsed, AgentRunSettings, lambda s: expert_run(s, "reach", "velocity"))
+
+    desk = expert_run(load(), "reach", "velocity")
+    assert of() == desk
+    assert of("--set", "sac.minibatch=64", "--set", "steps=9").sac.minibatch == 64
+    assert of("--set", "steps=9").evaluation == desk.evaluation
+    given = desk.model_copy(update={"steps": 77})
+    assert of("--settings", given.model_dump_json()) == given
+    assert of("--settings", given.model_dump_json(), "--set", "steps=78").steps == 78
+    assert of("--scale", "smoke") == expert_run(load(scale="smoke"), "reach", "velocity")
+
+
+def test_settings_verb_prints_what_it_would_load(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["settings", "json", "--scale", "smoke", "--set", "seeds=[7]"]) == 0
+    assert json.loads(capsys.readouterr().out)["seeds"] == [7]
+    assert cli.main(["settings", "check", "--scale", "paper"]) == 0
+    assert "valid: scale paper" in capsys.readouterr().out
+
+
+def test_deviations_of_the_paper_scale_are_none(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["deviations", "--scale", "paper"]) == 0
+    assert capsys.readouterr().out == ""
+    assert cli.main(["deviations"]) == 0
+    assert "sac.minibatch = 128 transitions (paper: 500)" in capsys.readouterr().out
+
+
+def test_plan_counts_the_jobs_of_the_design(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["plan", "--target", "table_2", "--scale", "paper"]) == 0
+    printed = dict(re.findall(r"^(\w+) +(\d+) ", capsys.readouterr().out, re.MULTILINE))
+    expected = design(load(scale="paper"), "table_2").jobs()
+    assert {stage: int(printed[stage]) for stage in expected} == expected
+    assert int(printed["total"]) == sum(expected.values())
+
+
+@pytest.fixture
+def rates() -> Rates:
+    """Round numbers, so that costs can be worked out by hand."""
+    return Rates(
+        machine="made up",
+        start_up=1.0,
+        environment_step={"default": 0.001, "push-back": 0.003},
+        action=0.001,
+        sac_update={128: 0.01, 256: 0.02},
+        discriminator_update={256: 0.004},
+        slowdown=1.0,
+        base_memory_mib=400,
+        agent_disk_mib=1,
+        bootstrap=0.0,
+    )
+
+
+def test_cost_of_an_agent_by_hand(rates: Rates) -> None:
+    settings = Settings(
+        expert={"steps": {"default": 2000}},
+        sac={"minibatch": 128, "updates_per_step": 0.5, "random_steps": 1000},
+        progress={"select_every": 1000, "select_episodes": 1},
+        evaluation={"episodes": 1, "episode_steps": 500},
+    )
+    steps, updates = 2000 + 2 * 500 + 2 * 500, (2000 - 1000) * 0.5
+    reach = cost(Expert("velocity", "reach", 0, 0), settings, rates)
+    assert reach.seconds == pytest.approx(1.0 + steps * 0.002 + updates * 0.01)
+    push = cost(Expert("velocity", "push-back", 0, 0), settings, rates)
+    assert push.seconds - reach.seconds == pytest.approx(steps * 0.002)
+
+
+def test_updates_between_and_beyond_the_measured_minibatches(rates: Rates) -> None:
+    assert rates.update(rates.sac_update, 192) == pytest.approx(0.015)
+    assert rates.update(rates.sac_update, 512) == pytest.approx(0.04)
+
+
+def test_irl_cost_grows_linearly_with_its_members(rates: Rates) -> None:
+    settings = load(scale="paper")
+    seconds = {}
+    for targets in (1, 2):
+        own = settings.model_copy(
+            update={
+                "multi_task": settings.multi_task.model_copy(update={"train_targets": tuple(range(1, targets + 1))})
+            }
+        )
+        (run, *_) = design(own, "table_4").irl_runs
+        seconds[len(run.members)] = cost(run, own, rates).seconds - rates.start_up
+    (few, some), (many, more) = sorted(seconds.items())
+    assert more / some == pytest.approx(many / few)
+
+
+def test_wall_time_is_bounded_by_work_and_by_the_longest_chain(rates: Rates) -> None:
+    settings = load()
+    stages = plan(design(settings), settings, rates)
+    total = sum(stage.core_hours for stage in stages)
+    assert wall_hours(stages, 1) == pytest.approx(total)
+    assert wall_hours(stages, 2) == pytest.approx(total / 2)
+    assert 0 < wall_hours(stages, 10_000) < total / 100
+
+
+def test_the_shipped_rates_are_measured() -> None:
+    rates = load_rates()
+    assert rates.start_up > 0
+    assert rates.sac_update[500] > rates.sac_update[128]
+    assert rates.environment_step["push-back"] > rates.environment_step["default"]
+
+
+@pytest.fixture
+def small(tmp_path: Path) -> Settings:
+    return load(scale="smoke", overrides=[f"results={tmp_path}"])
+
+
+def test_status_follows_a_run(small: Settings, tmp_path: Path) -> None:
+    run = Expert("velocity", "reach", 1, 0)
+    folder, log = tmp_path / run.folder, tmp_path / "logs" / f"{run.folder}.log"
+    assert run_status(run, small).state == WAITING
+    storage.append_line(log, "step 300/600")
+    assert run_status(run, small).state == RUNNING, "it has just started"
+    with storage.locked(folder):
+        os.utime(log, (0, 0))
+        assert (run_status(run, small).state, run_status(run, small).says) == (RUNNING, "step 300/600")
+    assert run_status(run, small).state == FAILED, "an old log, no lock, no result"
+    for name in OUTPUTS[run.stage]:
+        storage.write_text(folder / name, "x")
+    storage.write_json(folder / "settings.json", run.settings(small).model_dump(mode="json"))
+    storage.write_json(folder / "provenance.json", {"cost": {"wall_seconds": 12.0}})
+    storage.write_json(folder / "gate.json", {"passed": False})
+    done = run_status(run, small)
+    assert (done.state, done.passed, done.seconds) == (DONE, False, 12.0)
+    changed = small.model_copy(update={"expert": small.expert.model_copy(update={"steps": {"default": 601}})})
+    assert run_status(run, changed).state == OUTDATED
+    storage.write_text(folder / "gate.json", "{")
+    assert run_status(run, small).state == FAILED, "a truncated file"
+
+
+def test_time_left_is_what_the_done_runs_took(small: Settings, rates: Rates) -> None:
+    statuses = study_status(design(small), small)
+    assert {status.state for status in statuses} == {WAITING}
+    assert seconds_left(statuses, small, rates, 2) == pytest.approx(
+        sum(cost(status.run, small, rates).seconds for status in statuses) / 2
+    )
+
+
+def test_status_verb_on_an_empty_folder(small: Settings, capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["status", "--settings", small.model_dump_json()]) == 0
+    text = capsys.readouterr().out
+    assert re.search(r"^train_expert +0 +0 +0 +0 +\d+$", text, re.MULTILINE)
+    assert "time left" in text
+
+
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGTERM, 143), (signal.SIGINT, 130)])
+def test_a_stopped_job_leaves_no_half_written_file(tmp_path: Path, number: int, code: int) -> None:
+    run = tmp_path / "run"
+    command = [sys.executable, "-m", "mtcsirl.cli", "train-sac", *KEY, "--output", str(run), "--set", "steps=1000000"]
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as job:
+        while not (run / ".lock").exists():
+            assert job.poll() is None
+            time.sleep(0.05)
+        time.sleep(0.5)
+        job.send_signal(number)
+        error = job.communicate(timeout=60)[1]
+    assert job.returncode == code
+    assert "Traceback" not in error
+    assert not [path for path in run.iterdir() if path.name.endswith(".tmp") or path.name in OUTPUTS["train_sac"]]
+    assert not storage.is_locked(run)
