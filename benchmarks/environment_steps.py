@@ -6,7 +6,7 @@
 
 Ours is the environment that agents train in: float32 and mapped observations, divergence read. Stock is Meta-World's
 own class with its target fixed and nothing around it. Both take the same random actions in turns of 100 steps, in one
-thread, so that whatever else the machine does slows both alike.
+thread, and what counts is the processor time of that thread: whatever else the machine does slows both alike.
 """
 
 import argparse
@@ -14,12 +14,11 @@ import os
 from collections.abc import Callable
 from importlib.metadata import version
 from statistics import median
-from time import perf_counter
+from time import thread_time
 from typing import Any
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
-import mujoco
 import numpy as np
 
 from mtcsirl.environments import EPISODE_STEPS, make_environment
@@ -80,35 +79,46 @@ def _play(environment: Any, actions: np.ndarray) -> None:
 
 
 def _seconds(function: Callable[..., Any], *arguments: Any) -> float:
-    start = perf_counter()
+    start = thread_time()
     function(*arguments)
-    return perf_counter() - start
+    return thread_time() - start
 
 
-def profile(task: str, rounds: int = 7) -> dict[str, float]:
-    """Return microseconds of one step by part: simulation, observation, task reward, map to float32, the rest."""
+def profile(task: str, episodes: int = 5) -> dict[str, float]:
+    """Return microseconds of one step and of its parts: action, simulation, observation, reward, map, the rest."""
     environment = make_environment(task, 0)
     simulator = environment.simulator
     parts = {
-        "simulation": (_simulate, simulator),
-        "observation": (simulator._get_obs,),
-        "reward": (simulator.evaluate_state, simulator.reset()[0], np.zeros(4, np.float32)),
-        "map": (environment._seen, simulator.reset()[0]),
+        "action": (simulator, "set_xyz_action"),
+        "simulation": (simulator, "_simulate"),
+        "observation": (simulator, "_get_obs"),
+        "reward": (simulator, "evaluate_state"),
+        "map": (environment, "_seen"),
     }
-    samples: dict[str, list[float]] = {name: [] for name in (*parts, "step")}
-    for seed in range(rounds):
+    seconds = dict.fromkeys(parts, 0.0)
+    for part, (owner, method) in parts.items():
+        setattr(owner, method, _timed(getattr(owner, method), part, seconds))
+    total = 0.0
+    for seed in range(episodes):
         environment.reset()
-        for action in np.random.default_rng(seed).uniform(-1, 1, (EPISODE_STEPS, 4)).astype(np.float32):
-            samples["step"].append(_seconds(environment.step, action))
-            for name, call in parts.items():
-                samples[name].append(_seconds(*call))
-    micros = {name: 1e6 * median(values) for name, values in samples.items()}
-    return micros | {"rest": micros["step"] - sum(micros[name] for name in parts)}
+        if seed == 0:
+            seconds.update(dict.fromkeys(seconds, 0.0))  # the first reset simulates and observes
+        actions = np.random.default_rng(seed).uniform(-1, 1, (EPISODE_STEPS, 4)).astype(np.float32)
+        total += _seconds(_play, environment, actions)
+    micros = {name: 1e6 * value / (episodes * EPISODE_STEPS) for name, value in ({"step": total} | seconds).items()}
+    return micros | {"rest": micros["step"] - sum(micros[part] for part in parts)}
 
 
-def _simulate(simulator: Any) -> None:
-    mujoco.mj_step(simulator.model, simulator.data, nstep=simulator.frame_skip)
-    mujoco.mj_forward(simulator.model, simulator.data)
+def _timed(function: Callable[..., Any], part: str, seconds: dict[str, float]) -> Callable[..., Any]:
+    """Return the function, adding its time to ``seconds[part]``."""
+
+    def timed(*arguments: Any) -> Any:
+        start = thread_time()
+        result = function(*arguments)
+        seconds[part] += thread_time() - start
+        return result
+
+    return timed
 
 
 def main() -> None:

@@ -86,15 +86,18 @@ class FastEnvironment(SawyerXYZEnv):
             raise ValueError("the episode has ended: call reset()")
         self.set_xyz_action(action[:3])
         self._grip[:] = (action[3], -action[3])
-        mujoco.mj_step(self.model, self.data, nstep=self.frame_skip)
-        # Places bodies and contacts after the last step, and sets the solver's warm start for the next.
-        mujoco.mj_forward(self.model, self.data)
+        self._simulate()
         self.curr_path_length += 1
         observation = self._get_obs()
         np.maximum(observation, self._low, out=observation)
         np.minimum(observation, self._high, out=observation)
         reward, info = self.evaluate_state(observation, action)
         return observation, reward, False, self.curr_path_length == self.max_path_length, info
+
+    def _simulate(self) -> None:
+        mujoco.mj_step(self.model, self.data, nstep=self.frame_skip)
+        # Places bodies and contacts after the last step, and sets the solver's warm start for the next.
+        mujoco.mj_forward(self.model, self.data)
 
     def set_xyz_action(self, action: np.ndarray) -> None:
         """Move the mocap body, to which the hand is welded, by the action [3] in centimetres."""
