@@ -1,6 +1,7 @@
 """Made-up results of a study, as frames and as files."""
 
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from typing import Any
 from zlib import crc32
@@ -24,16 +25,26 @@ def noise(agent: dict[str, Any], metric: str, policy: str) -> float:
 
 def evaluation(study: Study, means: Means, spread: float = 0.0) -> pd.DataFrame:
     """Rows as ``evaluation_rows`` gives them, every run present, value = mean (1 + spread x noise)."""
-    rows = []
+    keys, rows = _frame(study)
+    centres = [{"success": 1.0, "velocity": 0.3, "action_norm": 1.6, "task_reward": 8.0} | means(key) for key in keys]
+    pairs = zip(rows["agent"], rows["metric"], strict=True)
+    centre = np.array([centres[agent][metric] for agent, metric in pairs])
+    return rows.assign(value=centre * (1 + spread * rows["noise"]))[list(ROW_COLUMNS)]
+
+
+@cache
+def _frame(study: Study) -> tuple[list[dict[str, Any]], pd.DataFrame]:
+    """The keys of all agents, and their rows without values."""
+    keys, rows = [], []
     for run in study:
-        for agent in agents(run):
-            values = {"success": 1.0, "velocity": 0.3, "action_norm": 1.6, "task_reward": 8.0} | means(agent)
+        for key in agents(run):
+            keys.append(key)
+            own = key | {"agent": len(keys) - 1, "episodes": 10, "status": OK, "folder": f"results/{run.folder}"}
             for policy in POLICIES:
                 for metric in metrics(study):
-                    value = values[metric] * (1 + spread * noise(agent, metric, policy))
-                    own = {"policy": policy, "metric": metric, "value": value, "episodes": 10, "status": OK}
-                    rows.append(agent | own | {"folder": f"results/{run.folder}"})
-    return pd.DataFrame(rows)[list(ROW_COLUMNS)]
+                    jitter = noise(key, metric, policy)
+                    rows.append(own | {"policy": policy, "metric": metric, "noise": jitter})
+    return keys, pd.DataFrame(rows)
 
 
 def write_run(run: Any, results: Path, means: Means, *, episodes: int = 2, passed: bool = True) -> None:

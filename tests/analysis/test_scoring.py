@@ -19,11 +19,9 @@ ARCHITECTURE = {
 
 
 def policy(seed):
-    random = torch.Generator().manual_seed(seed)
-    return Policy(
-        weights=(torch.randn(16, 39, generator=random) * 0.1, torch.randn(8, 16, generator=random) * 0.1),
-        biases=(torch.zeros(16), torch.zeros(8)),
-    )
+    random = np.random.default_rng(seed)
+    weights = tuple(random.normal(0, 0.1, shape).astype(np.float32) for shape in ((16, 39), (8, 16)))
+    return Policy(weights=weights, biases=(np.zeros(16, np.float32), np.zeros(8, np.float32)))
 
 
 def samples(members, episodes, steps):
@@ -86,7 +84,9 @@ def test_controls_say_what_they_must(results):
             key = {"transitions": transitions, "statistic": statistic}
             assert value(scores, reward="truth", **key)["value"] == pytest.approx(1.0)
             assert np.isnan(value(scores, reward="zero", **key)["value"])
-        assert value(scores, reward="truth", transitions=transitions, statistic="epic")["value"] == pytest.approx(0.0, abs=1e-6)
+        assert value(scores, reward="truth", transitions=transitions, statistic="epic")["value"] == pytest.approx(
+            0.0, abs=1e-6
+        )
 
 
 def test_scores_agree_with_the_points(results):

@@ -1,0 +1,214 @@
+"""The criteria of ``claims.yaml``, one function per kind: evidence in, judged units out."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from mtcsirl.analysis.evidence import Evidence, multi_target, multi_task, single_target
+from mtcsirl.analysis.judging import (
+    BLOCKED,
+    MET,
+    NOT_MET,
+    UNCLEAR,
+    Rules,
+    Unit,
+    advantage,
+    against,
+    at_least,
+    at_most,
+    checked,
+    checked_runs,
+    closed,
+    closing,
+    judge_correlation,
+    judged_unit,
+    scaled,
+    tasks_of,
+    three_way,
+)
+from mtcsirl.analysis.rows import select
+from mtcsirl.analysis.statistics import Estimate, Interval, Summary, equivalent, mean_correlation, t_interval, welch
+from mtcsirl.published import UNKNOWN as NOT_PRINTED
+from mtcsirl.published import in_paper_order
+
+
+def on_target(evidence: Evidence, rules: Rules) -> Iterator[Unit]:
+    """C1, C2, C11: agents are on target and succeed."""
+    settings, paper = evidence.settings, evidence.published
+    for cs in in_paper_order(settings.cs_rewards):
+        target = paper.target(cs)
+        for task in tasks_of(evidence, rules["units"]):
+            if rules["agent"] == "expert":
+                run, group, printed = None, evidence.experts(cs, [task]), paper.unseen("expert", cs, cs)
+            elif rules["agent"] == "generator":
+                run, printed = single_target(cs, task), NOT_PRINTED
+                group = evidence.generators(run)
+            else:
+                run = multi_task(settings, cs, "mt_csirl_lt")
+                group = evidence.transfers(run, [task], settings.multi_task.train_targets[0])
+                printed = scaled(paper.learned_task(task, cs, cs), target)
+            limit = rules["distance"].get(cs, max(rules["distance"].values()))
+            distance = scaled(group.distance, 1 / target)
+            parts = [
+                at_most(distance, limit, "distance to the target"),
+                at_least(group.success, rules["success"], "success"),
+            ]
+            value = Estimate(distance.mean, *t_interval(distance), distance.n)
+            unit = judged_unit(cs, task, group, parts, "distance to the target / target", value, printed)
+            yield checked(evidence, unit, rules, run, group)
+
+
+def equivalent_to_sac(evidence: Evidence, rules: Rules) -> Iterator[Unit]:
+    """C3: the new agent's metric equals plain SAC's within a margin of the gap from SAC to expert."""
+    for cs in in_paper_order(evidence.settings.cs_rewards):
+        for task in tasks_of(evidence, rules["units"]):
+            run = single_target(cs, task)
+            group, sac, expert = (
+                evidence.transfers(run, [task]), evidence.sac(cs, [task]), evidence.experts(cs, [task])
+            )  # fmt: skip
+            ours, base = group.metric, sac.metric
+            # Only the experts behind the demonstrations need to be there; without any, the target stands in.
+            goal = expert.metric.mean if expert.metric.n else group.target
+            gap = goal - base.mean
+            test = welch(ours, base)
+            margin = rules["margin"] * abs(gap)
+            if equivalent(ours, base, margin):
+                parts = [(MET, "equal to SAC within the margin")]
+            elif test.low > margin or test.high < -margin:
+                parts = [(NOT_MET, "differs from SAC by more than the margin")]
+            else:
+                parts = [(UNCLEAR, "neither equal nor different with these seeds")]
+            low, high = sorted((test.low / gap, test.high / gap))
+            value = Estimate(test.difference / gap, low, high, ours.n)
+            unit = judged_unit(cs, task, group, parts, "difference to SAC / gap from SAC to expert", value)
+            yield checked(evidence, against(unit, group, sac, "SAC"), rules, run, group, sac)
+
+
+def correlation(evidence: Evidence, rules: Rules) -> Iterator[Unit]:
+    """C4, C9: Pearson's r of learned and true reward, mean over IRL seeds on Fisher's z scale."""
+    settings = evidence.settings
+    for cs in in_paper_order(settings.cs_rewards):
+        if rules["experiment"] == "single_target":
+            run = single_target(cs, settings.single_target.tasks[0])
+        else:
+            run = multi_task(settings, cs, "mt_csirl")
+        chosen = select(
+            evidence.scores,
+            **run.key,
+            transitions=rules["transitions"],
+            reward="learned",
+            statistic="pearson",
+        )
+        r = mean_correlation(chosen["value"])
+        unit = Unit(
+            cs_reward=cs,
+            what=run.source,
+            state=judge_correlation(r, rules),
+            reason=f"on {rules['transitions']} transitions",
+            measure="Pearson's r of learned and true reward",
+            value=r,
+            ours=Summary(r.value, float(chosen["value"].std()), r.n),
+            interval=Interval(r.low, r.high),
+            paper=evidence.published.correlation(rules["experiment"], cs),
+        )
+        yield checked_runs(evidence, unit, rules, run, r.n)
+
+
+def closes_gap(evidence: Evidence, rules: Rules) -> Iterator[Unit]:
+    """C5, C7, C10: new agents close a stated part of SAC's gap and succeed."""
+    settings, paper = evidence.settings, evidence.published
+    for cs in in_paper_order(settings.cs_rewards):
+        if rules["units"] == "unseen":
+            run, tasks = multi_task(settings, cs, rules["method"]), settings.multi_task.unseen_tasks
+            cases = [(run, tasks, "unseen tasks", paper.unseen(rules["method"], cs, cs))]
+        else:
+            cases = [
+                (multi_target(settings, cs, task), (task,), task,
+                 scaled(paper.cross_transfer(cs, task, task), paper.target(cs)))
+                for task in settings.multi_target.tasks
+            ]  # fmt: skip
+        for run, tasks, what, printed in cases:
+            group, sac = evidence.transfers(run, tasks), evidence.sac(cs, tasks)
+            parts = [
+                closing(group.distance, sac.distance, rules["at_least"]),
+                at_least(group.success, rules["success"], "success"),
+            ]
+            unit = judged_unit(cs, what, group, parts, "part of SAC's gap closed", closed(group, sac), printed)
+            yield checked(evidence, against(unit, group, sac, "SAC"), rules, run, group, sac)
+
+
+def stays_behind(evidence: Evidence, rules: Rules) -> Iterator[Unit]:
+    """C6: on other tasks the reward of one task closes little of SAC's gap, and less than on its own."""
+    settings, paper = evidence.settings, evidence.published
+    for cs in in_paper_order(settings.cs_rewards):
+        for source in settings.multi_target.tasks:
+            others = [task for task in settings.multi_target.tasks if task != source]
+            run = multi_target(settings, cs, source)
+            group, own = evidence.transfers(run, others), evidence.transfers(run, [source])
+            sac, sac_own = evidence.sac(cs, others), evidence.sac(cs, [source])
+            far, base = group.distance, sac.distance
+            contrast = welch(far, scaled(base, 1 - rules["at_most"]))
+            behind = welch(far, own.distance)
+            parts = [
+                three_way(contrast.difference >= 0, contrast.high < 0, "closes no more than the limit off its task"),
+                three_way(behind.low > 0, behind.high < 0, "stays behind its own task"),
+            ]
+            printed = [paper.cross_transfer(cs, source, task).mean for task in others]
+            cell = Summary(float(np.mean(printed)) * paper.target(cs), np.nan, paper.seeds)
+            unit = judged_unit(
+                cs, source, group, parts, "part of SAC's gap closed off its task", closed(group, sac), cell
+            )
+            unit = checked(evidence, against(unit, group, own, "own task"), rules, run, group, sac, own, sac_own)
+            needed, _ = closing(own.distance, sac_own.distance, rules["needs_diagonal"])
+            if unit.state in (MET, UNCLEAR) and needed != MET:
+                unit = replace(unit, state=BLOCKED, reason="its reward does not transfer to its own task either")
+            yield unit
+
+
+def better_than(evidence: Evidence, rules: Rules) -> Iterator[Unit]:
+    """C8: the method is closer to the target and succeeds more often than each of the others."""
+    settings, paper = evidence.settings, evidence.published
+    tasks = settings.multi_task.unseen_tasks
+    for cs in in_paper_order(settings.cs_rewards):
+        run = multi_task(settings, cs, rules["method"])
+        ours, sac = evidence.transfers(run, tasks), evidence.sac(cs, tasks)
+        for other in rules["others"]:
+            theirs = evidence.transfers(multi_task(settings, cs, other), tasks)
+            needed = rules["metric_advantage"] * sac.distance.mean
+            nearer, oftener = welch(theirs.distance, ours.distance), welch(ours.success, theirs.success)
+            parts = [
+                advantage(nearer, needed, "closer to the target"),
+                advantage(oftener, rules["success_advantage"], "more often successful"),
+            ]
+            gap = sac.distance.mean
+            value = Estimate(nearer.difference / gap, nearer.low / gap, nearer.high / gap, theirs.distance.n)
+            printed = paper.unseen(other, cs, cs)
+            unit = judged_unit(cs, other, theirs, parts, "distance lost to MT-CSIRL / SAC's gap", value, printed)
+            unit = against(unit, theirs, ours, "MT-CSIRL")
+            yield checked(evidence, unit, rules, run, ours, theirs, sac)
+
+
+def suffers_without(evidence: Evidence, rules: Rules) -> Iterator[Unit]:
+    """C12: generators trained without the curriculum succeed less often than those trained with it."""
+    settings = evidence.settings
+    for cs in in_paper_order(settings.cs_rewards):
+        run = multi_task(settings, cs, "mt_csirl")
+        with_it = evidence.generators(run)
+        without = evidence.generators(replace(run, experiment=rules["experiment"]))
+        test = welch(with_it.success, without.success)
+        parts = [advantage(test, rules["advantage"], "more often successful with the curriculum")]
+        value = Estimate(test.difference, test.low, test.high, without.success.n)
+        unit = judged_unit(cs, "train tasks", without, parts, "success lost without the curriculum", value)
+        yield checked(evidence, against(unit, without, with_it, "with the curriculum"), rules, run, with_it, without)
+
+
+KINDS: dict[str, Callable[[Evidence, Rules], Iterator[Unit]]] = {
+    "on_target": on_target,
+    "equivalent_to_sac": equivalent_to_sac,
+    "correlation": correlation,
+    "closes_gap": closes_gap,
+    "stays_behind": stays_behind,
+    "better_than": better_than,
+    "suffers_without": suffers_without,
+}

@@ -1,0 +1,280 @@
+import json
+
+import pandas as pd
+import pytest
+
+from mtcsirl.analysis.claims import VERDICTS, claims_json, claims_markdown, combine, judge, load_criteria
+from mtcsirl.analysis.evidence import Group
+from mtcsirl.analysis.judging import MET, NOT_MET, closing
+from mtcsirl.analysis.rows import select
+from mtcsirl.analysis.statistics import Summary
+from mtcsirl.settings import Settings
+from tests.analysis.made_up_claims import SETTINGS, as_the_paper_says, at, changed, finding, rows_of, scores, verdict
+
+CLAIMS = tuple(load_criteria()["claims"])
+
+
+@pytest.fixture(scope="module")
+def findings():
+    return judge(rows_of(as_the_paper_says), scores(), SETTINGS)
+
+
+def test_a_study_as_the_paper_says_reproduces_every_claim(findings):
+    assert {finding.name: finding.verdict for finding in findings} == dict.fromkeys(CLAIMS, "reproduced")
+    assert tuple(f"C{number}" for number in range(1, 13)) == CLAIMS
+
+
+def transfer(agent, experiment):
+    return agent["stage"] == "transfer" and agent["experiment"] == experiment
+
+
+def off_diagonal(agent):
+    return transfer(agent, "multi_target") and agent["source"] != agent["task"]
+
+
+NOT_REPRODUCED = {
+    "experts stop half way": ("C1", lambda a: a["stage"] == "train_expert", lambda a: at(a["cs_reward"], 0.5)),
+    "experts fail the task": ("C1", lambda a: a["stage"] == "train_expert", lambda a: at(a["cs_reward"], 1, 0.5)),
+    "generator learns no behaviour": (
+        "C2", lambda a: a["experiment"] == "single_target", lambda a: at(a["cs_reward"], 0.2)),
+    "the single-task reward transfers": (
+        "C3", lambda a: transfer(a, "single_target"), lambda a: at(a["cs_reward"], 0.8)),
+    "no transfer to new targets": ("C5", lambda a: transfer(a, "multi_target"), lambda a: at(a["cs_reward"], 0.1)),
+    "transfer that ruins the task": (
+        "C5", lambda a: transfer(a, "multi_target"), lambda a: at(a["cs_reward"], 0.9, 0.5)),
+    "an overshoot is no transfer": ("C5", lambda a: transfer(a, "multi_target"), lambda a: at(a["cs_reward"], 1.9)),
+    "transfer to other tasks": ("C6", off_diagonal, lambda a: at(a["cs_reward"], 0.8)),
+    "no transfer to unseen tasks": ("C7", lambda a: transfer(a, "multi_task"), lambda a: at(a["cs_reward"], 0.1)),
+    "baselines as good": ("C8", lambda a: transfer(a, "multi_task"), lambda a: at(a["cs_reward"], 0.85)),
+    "baselines fail the task alone": (
+        "C8", lambda a: transfer(a, "multi_task") and a["method"] in ("mt_airl", "mt_vairl", "mt_vairl_gp"),
+        lambda a: at(a["cs_reward"], 0.95, 0.7)),
+    "LT does not transfer": ("C10", lambda a: a["method"] == "mt_csirl_lt", lambda a: at(a["cs_reward"], 0.1)),
+    "LT's rewards do not train": (
+        "C11", lambda a: a["method"] == "mt_csirl_lt" and a["stage"] == "transfer",
+        lambda a: at(a["cs_reward"], 0.9, 0.3)),
+    "the curriculum does nothing": (
+        "C12", lambda a: a["experiment"] == "ablation_curriculum", lambda a: at(a["cs_reward"], 0.9)),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", NOT_REPRODUCED)
+def test_results_against_the_paper_are_not_reproduced(case):
+    name, test, result = NOT_REPRODUCED[case]
+    assert verdict(name, changed(test, result)) == "not reproduced"
+
+
+@pytest.mark.parametrize(("name", "r"), [("C4", 0.8), ("C4", -0.8), ("C9", 0.2)])
+def test_correlations_against_the_paper_are_not_reproduced(name, r):
+    assert verdict(name, correlations={"single_target": r, "multi_task": r}) == "not reproduced"
+
+
+def test_correlations_that_swing_between_seeds_decide_nothing():
+    by_seed = {0: -0.6, 1: -0.2, 2: 0.1, 3: 0.4, 4: 0.8}
+    assert verdict("C4", rescore=lambda frame: frame.assign(value=frame["seed"].map(by_seed))) == "inconclusive"
+
+
+def test_one_cs_reward_of_two_is_partial():
+    only = changed(lambda a: transfer(a, "multi_task") and a["cs_reward"] == "velocity", lambda a: at("velocity", 0.1))
+    assert verdict("C7", only) == "partially"
+    assert verdict("C10", only) == "partially"
+
+
+def test_one_task_of_five_is_spared():
+    one = changed(
+        lambda a: transfer(a, "multi_target") and a["source"] == a["task"] == "push-back",
+        lambda a: at(a["cs_reward"], 0.1),
+    )
+    assert verdict("C5", one) == "reproduced", "4 of 5 tasks"
+    half = changed(
+        lambda a: transfer(a, "multi_target") and a["task"] in ("push-back", "reach-wall", "drawer-close"),
+        lambda a: at(a["cs_reward"], 0.1),
+    )
+    assert verdict("C5", half) == "partially"
+
+
+def test_noise_is_inconclusive_and_never_equivalence():
+    """Transferred and SAC have equal means but spread so much that a large difference may hide."""
+
+    def shaken(rows):
+        wild = rows["stage"].isin(["transfer", "train_sac"]) & rows["metric"].isin(["velocity", "action_norm"])
+        factor = rows["seed"].map({0: 0.2, 1: 0.6, 2: 1.0, 3: 1.4, 4: 1.8})
+        return rows.assign(value=rows["value"].where(~wild, rows["value"] * factor))
+
+    found = finding("C3", change=shaken)
+    assert found.verdict == "inconclusive"
+    assert "unclear" in {unit.state for unit in found.units}
+
+
+def test_a_small_but_certain_difference_is_still_equivalence():
+    """A difference of 10 % of the gap is significant with little noise, and yet within the margin."""
+    small = changed(lambda a: transfer(a, "single_target"), lambda a: at(a["cs_reward"], 0.1))
+    found = finding("C3", small, spread=0.01)
+    assert max(unit.difference.p for unit in found.units) < 0.05
+    assert found.verdict == "reproduced"
+
+
+@pytest.mark.parametrize("name", CLAIMS)
+def test_fewer_than_five_seeds_are_inconclusive(name):
+    """Whatever the results say: for (as the paper) or against (everything like SAC)."""
+    settings = SETTINGS.model_copy(update={"seeds": (0, 1, 2, 3), "irl_seeds": (0, 1, 2, 3)})
+    assert verdict(name, settings=settings) == "inconclusive"
+    flat = changed(lambda a: a["stage"] != "train_sac" and name != "C6", lambda a: at(a["cs_reward"], 0.0, 0.4))
+    assert (
+        verdict(name, flat, settings=settings, correlations={"single_target": 0.9, "multi_task": 0.1}) == "inconclusive"
+    )
+
+
+@pytest.mark.parametrize("name", ["C2", "C3", "C5", "C7", "C9"])
+def test_agents_that_share_a_learned_reward_are_not_independent(name):
+    settings = SETTINGS.model_copy(update={"irl_seeds": (0,)})
+    found = finding(name, settings=settings)
+    assert found.verdict == "inconclusive"
+    assert "1 of the 5 independent seeds" in found.units[0].reason
+
+
+def fail_gates(rows, **key):
+    failed = rows.index.isin(select(rows, **key).index)
+    return rows.assign(status=rows["status"].mask(failed, "below gate"))
+
+
+@pytest.mark.parametrize("name", [name for name in CLAIMS if name != "C1"])
+def test_failed_experts_are_a_failed_precondition(name):
+    assert verdict(name, change=lambda rows: fail_gates(rows, stage="train_expert")) == "precondition not met"
+
+
+@pytest.mark.parametrize(
+    ("name", "expected"),
+    [
+        ("C3", "precondition not met"),
+        ("C4", "precondition not met"),
+        ("C6", "precondition not met"),
+        ("C5", "reproduced"),
+    ],
+)
+def test_a_broken_irl_confirms_no_claim_that_something_fails(name, expected):
+    assert verdict(name, change=lambda rows: fail_gates(rows, stage="learn_reward")) == expected
+
+
+def test_failure_off_its_task_needs_success_on_it():
+    useless = changed(lambda a: transfer(a, "multi_target"), lambda a: at(a["cs_reward"], 0.0))
+    assert verdict("C6", useless) == "precondition not met"
+
+
+def test_no_gap_no_verdict():
+    on_target = changed(lambda a: a["stage"] == "train_sac", lambda a: {"velocity": 0.79, "action_norm": 2.95})
+    assert verdict("C7", on_target) == "precondition not met"
+
+
+def test_one_failed_expert_of_six_is_spared():
+    one = {"stage": "train_expert", "task": "reach", "seed": 0}
+    assert verdict("C7", change=lambda rows: fail_gates(rows, **one)) == "reproduced"
+    two = one | {"task": ["reach", "door-close"]}
+    assert verdict("C7", change=lambda rows: fail_gates(rows, **two)) == "precondition not met"
+
+
+def missing(rows, **key):
+    gone = rows.index.isin(select(rows, **key).index)
+    return rows.assign(value=rows["value"].mask(gone), status=rows["status"].mask(gone, "missing"))
+
+
+def test_missing_runs_are_not_run_and_not_failures():
+    assert verdict("C7", change=lambda rows: missing(rows, stage="transfer")) == "not run"
+    assert verdict("C3", change=lambda rows: missing(rows, stage="train_sac")) == "not run"
+    one_seed = {"stage": "transfer", "experiment": "multi_task", "method": "mt_csirl", "seed": 4}
+    assert verdict("C7", change=lambda rows: missing(rows, **one_seed)) == "inconclusive"
+
+
+def test_the_curriculum_claim_needs_its_ablation():
+    without = finding("C12", change=lambda rows: rows[rows["experiment"] != "ablation_curriculum"])
+    assert without.verdict == "not run"
+
+
+def test_nothing_at_all_is_not_run():
+    rows = rows_of(as_the_paper_says).iloc[:0]
+    found = judge(rows, scores().iloc[:0], SETTINGS)
+    assert {finding.verdict for finding in found} == {"not run"}
+    text = json.dumps(claims_json(found, SETTINGS), allow_nan=False)
+    assert "NaN" not in text
+
+
+def test_smoke_scale_decides_nothing():
+    assert verdict("C5", settings=SETTINGS.model_copy(update={"scale": "smoke"})) == "inconclusive"
+
+
+@pytest.mark.parametrize(
+    ("states", "expected"),
+    [
+        (["met"] * 4 + ["not met"], "reproduced"),
+        (["met"] * 4 + ["unclear"], "reproduced"),
+        (["met"] * 3 + ["unclear", "not met"], "inconclusive"),
+        (["met"] * 3 + ["not met"] * 2, "partially"),
+        (["not met"] * 5, "not reproduced"),
+        (["not met"] * 2 + ["unclear"] * 3, "not reproduced"),
+        (["not met"] + ["unclear"] * 4, "inconclusive"),
+        (["too few seeds"] * 5, "inconclusive"),
+        (["met"] * 4 + ["not run"], "reproduced"),
+        (["met"] * 3 + ["not run"] * 2, "not run"),
+        (["met"] * 3 + ["precondition not met"] * 2, "precondition not met"),
+        ([], "not run"),
+    ],
+)
+def test_verdict_over_units(states, expected):
+    assert combine(states, 0.8)[0] == expected
+
+
+def test_every_verdict_is_reached_above():
+    reached = {"reproduced", "partially", "not reproduced", "inconclusive", "precondition not met", "not run"}
+    assert reached == set(VERDICTS)
+
+
+def test_closing_by_hand():
+    """SAC misses by 0.48; an agent that misses by 0.08 closes 5/6 of the gap; one that misses by 0.40 one sixth."""
+    sac = Summary(0.48, 0.02, 5)
+    assert closing(Summary(0.08, 0.02, 5), sac, 0.5)[0] == MET
+    assert closing(Summary(0.40, 0.02, 5), sac, 0.5)[0] == NOT_MET
+    assert closing(Summary(0.22, 0.30, 5), sac, 0.5)[0] == "unclear"
+    assert closing(Summary(0.30, 0.30, 5), sac, 0.5)[0] == "unclear"
+
+
+def test_falling_short_and_overshooting_count_alike():
+    frame = pd.DataFrame({"velocity": [0.7, 0.9], "success": [1.0, 1.0]}, index=[0, 1])
+    group = Group("transfer", {"reach": frame}, "velocity", 0.8)
+    assert group.distance.mean == pytest.approx(0.1)
+
+
+def test_numbers_of_a_unit_are_those_of_the_rows(findings):
+    """MT-CSIRL, velocity: against the same numbers taken from the rows by hand."""
+    rows = select(rows_of(as_the_paper_says), metric="velocity", policy="stochastic", target=0)
+    ours = select(rows, stage="transfer", experiment="multi_task", method="mt_csirl", cs_reward="velocity")
+    ours = ours[ours["task"].isin(SETTINGS.multi_task.unseen_tasks)].groupby("seed")["value"].mean()
+    unit = next(u for f in findings if f.name == "C7" for u in f.units if u.cs_reward == "velocity")
+    assert unit.ours == pytest.approx((ours.mean(), ours.std(), 5))
+    assert unit.paper == (0.73, 0.07, 5)
+    assert unit.inside is True
+    assert unit.closer == 1.0
+    assert unit.effect.value > 5
+
+
+def test_json_and_markdown_show_all_that_was_judged(findings):
+    data = json.loads(json.dumps(claims_json(findings, SETTINGS), allow_nan=False))
+    assert [claim["name"] for claim in data["claims"]] == list(CLAIMS)
+    unit = next(c for c in data["claims"] if c["name"] == "C7")["units"][0]
+    assert unit["published"]["prediction_interval"]["low"] == pytest.approx(2.434, abs=1e-3)
+    assert unit["hedges_g"]["low"] < unit["hedges_g"]["value"] < unit["hedges_g"]["high"]
+    assert {"unit", "paper", "ours", "answer"} <= set(unit)
+    text = claims_markdown(findings, SETTINGS)
+    assert all(f"### {name}: reproduced" in text for name in CLAIMS)
+    assert "g = " in text
+
+
+def test_every_claim_states_its_criterion():
+    for claim in load_criteria()["claims"].values():
+        assert all(claim[name].strip() for name in ("text", "locus", "criterion"))
+
+
+def test_an_own_cs_reward_is_judged_without_the_papers_numbers():
+    settings = Settings(cs_rewards=("velocity",))
+    found = finding("C7", settings=settings)
+    assert found.verdict == "reproduced"
+    assert len(found.units) == 1
