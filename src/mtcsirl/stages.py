@@ -14,11 +14,8 @@ from mtcsirl import storage
 from mtcsirl.agents.policy import load_policy
 from mtcsirl.agents.relabelling import ground_truth
 from mtcsirl.agents.training import AgentJob, train_agents
-from mtcsirl.demonstrations import collect_demonstrations as collect
-from mtcsirl.irl.run import learn_reward as run_irl
 from mtcsirl.provenance import Stopwatch, write_provenance
 from mtcsirl.rewards.learned import DESCRIPTION, WEIGHTS, load_learned_reward
-from mtcsirl.scoring import score
 from mtcsirl.settings.runs import (
     AgentRunSettings,
     DemonstrationRunSettings,
@@ -79,6 +76,8 @@ def collect_demonstrations(
     settings: DemonstrationRunSettings, expert: Path, task: str, target: int, cs_reward: str, output: Path
 ) -> None:
     """Record episodes of the stochastic expert in the folder ``expert`` as ``demonstrations.parquet``."""
+    from mtcsirl.demonstrations import collect_demonstrations as collect
+
     with _run(settings, output, {"policy": expert / "policy.safetensors"}):
         frame = collect(load_policy(expert), task, target, settings, seed=0)
         storage.write_parquet(output / "demonstrations.parquet", frame)
@@ -93,6 +92,8 @@ def learn_reward(
     output: Path,
 ) -> None:
     """Algorithm 1 or 2 over one file of demonstrations per task and target."""
+    from mtcsirl.irl.run import learn_reward as run_irl
+
     inputs = {f"demonstrations_{index}": Path(file) for index, file in enumerate(demonstrations)}
     with _run(settings, output, inputs):
         run_irl(output, method, cs_reward, demonstrations, seed, settings)
@@ -110,6 +111,8 @@ def score_reward(
     output: Path,
 ) -> None:
     """Hold the learned reward in the folder ``reward`` against the truth on named transition sets."""
+    from mtcsirl.scoring import score  # scipy.stats, which the other stages start without
+
     with _run(settings, output, {"reward": reward / WEIGHTS}):
         score(settings, reward, expert, baseline, task, target, cs_reward, seed, output)
 
