@@ -142,8 +142,9 @@ def stays_behind(evidence: Evidence, rules: Rules) -> Iterator[Unit]:
     """C6: on other tasks the reward of one task closes little of SAC's gap, and less than on its own."""
     settings, paper = evidence.settings, evidence.published
     for cs in in_paper_order(settings.cs_rewards):
-        for source in settings.multi_target.tasks:
-            others = [task for task in settings.multi_target.tasks if task != source]
+        tasks = settings.multi_target.tasks
+        for source in tasks if len(tasks) > 1 else ():
+            others = [task for task in tasks if task != source]
             run = multi_target(settings, cs, source)
             group, own = evidence.transfers(run, others), evidence.transfers(run, [source])
             sac, sac_own = evidence.sac(cs, others), evidence.sac(cs, [source])

@@ -1,17 +1,23 @@
-"""The verbs that read a study's results: tables, figures, claims, report."""
+"""The verbs that read a study's results: tables, figures, claims, results page, report."""
 
 import argparse
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from mtcsirl.commands.arguments import Verbs, add_study_settings, add_verb, study_settings
 from mtcsirl.design import ARTEFACTS, design
+from mtcsirl.settings import Settings
+
+if TYPE_CHECKING:
+    from mtcsirl.analysis.claims import Finding
 
 
 def register(verbs: Verbs) -> None:
     """Add the verbs."""
     _add(verbs, "table", _table, does="make one of the paper's tables", writes="table_N.csv, .md, .tex", numbered=True)
     _add(verbs, "figure", _figure, does="draw one of the paper's figures", writes="figure_N.pdf, .png", numbered=True)
-    _add(verbs, "claims", _claims, does="judge the paper's claims", writes="claims.json, claims.md")
+    _add(verbs, "claims", _claims, does="judge the paper's claims", writes="claims.json, .md, .pdf, .png")
+    _add(verbs, "results", _results, does="write verdicts and tables as one Markdown page", writes="results.md")
     _add(verbs, "report", _report, does="make the page that shows everything", writes="index.html")
 
 
@@ -70,19 +76,46 @@ def _figure(parsed: argparse.Namespace) -> None:
 
 
 def _claims(parsed: argparse.Namespace) -> None:
-    from mtcsirl.analysis.claims import claims_json, claims_markdown, judge
-    from mtcsirl.analysis.rows import evaluation_rows, score_rows
-    from mtcsirl.storage import write_json, write_text
+    from mtcsirl.analysis.claims import claims_json, claims_markdown
+    from mtcsirl.analysis.claims_figure import CAPTION, claims_figure
+    from mtcsirl.figures.style import figure_bytes
+    from mtcsirl.storage import write_bytes, write_json, write_text
 
     settings = study_settings(parsed)
-    study = design(settings)
-    rows = evaluation_rows(study, settings.results, partial=parsed.partial)
-    findings = judge(rows, score_rows(study, settings.results, partial=parsed.partial), settings)
+    findings = _judged(settings, parsed.partial)
     folder = parsed.output or Path(settings.results) / "claims"
     text = claims_markdown(findings, settings)
     write_json(folder / "claims.json", claims_json(findings, settings))
     write_text(folder / "claims.md", text)
+    figure = claims_figure(findings, settings)
+    write_bytes(folder / "claims.pdf", figure_bytes(figure, "pdf", CAPTION))
+    write_bytes(folder / "claims.png", figure_bytes(figure, "png", CAPTION))
     print(text)
+
+
+def _judged(settings: Settings, partial: bool) -> "list[Finding]":
+    from mtcsirl.analysis.claims import judge
+    from mtcsirl.analysis.rows import evaluation_rows, score_rows
+
+    study = design(settings)
+    rows = evaluation_rows(study, settings.results, partial=partial)
+    return judge(rows, score_rows(study, settings.results, partial=partial), settings)
+
+
+def _results(parsed: argparse.Namespace) -> None:
+    from mtcsirl.analysis.results_page import results_page
+    from mtcsirl.analysis.rows import evaluation_rows
+    from mtcsirl.provenance import commit, machine
+    from mtcsirl.storage import write_text
+    from mtcsirl.tables import TABLES
+
+    settings = study_settings(parsed)
+    rows = {name: evaluation_rows(design(settings, name), settings.results, partial=parsed.partial) for name in TABLES}
+    tables = {name: table(rows[name], settings) for name, table in TABLES.items()}
+    made = {"commit": commit(), **machine()}
+    page = (parsed.output or Path("docs")) / "results.md"
+    write_text(page, results_page(_judged(settings, parsed.partial), tables, settings, provenance=made))
+    print(page)
 
 
 def _report(parsed: argparse.Namespace) -> None:

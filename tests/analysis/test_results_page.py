@@ -1,0 +1,81 @@
+import pytest
+from matplotlib.figure import Figure
+
+from mtcsirl.analysis.claims import judge, load_criteria
+from mtcsirl.analysis.claims_figure import claims_figure, limits_of
+from mtcsirl.analysis.results_page import results_page
+from mtcsirl.cli import main
+from mtcsirl.design import design
+from mtcsirl.settings import Settings
+from mtcsirl.storage import read_json, read_text, write_json
+from mtcsirl.tables import TABLES
+from tests.analysis.made_up_claims import SETTINGS, as_the_paper_says, evaluation, rows_of, scores
+
+
+@pytest.fixture(scope="module")
+def findings():
+    return judge(rows_of(as_the_paper_says), scores(), SETTINGS)
+
+
+def texts(figure):
+    return [text.get_text() for axes in figure.axes for text in axes.texts]
+
+
+def test_figure_has_a_row_and_a_verdict_per_claim(findings):
+    figure = claims_figure(findings, SETTINGS)
+    assert isinstance(figure, Figure)
+    found = texts(figure)
+    assert [text for text in found if text in load_criteria()["claims"]] == list(load_criteria()["claims"])
+    assert found.count("reproduced") == 12
+    drawn = figure.axes[0].lines
+    assert len([line for line in drawn if line.get_marker() == "o"]) == len(findings[0].units)
+
+
+def test_figure_of_nothing_and_of_smoke_says_so():
+    nothing = judge(rows_of(as_the_paper_says).iloc[:0], scores().iloc[:0], SETTINGS)
+    smoke = claims_figure(nothing, SETTINGS.model_copy(update={"scale": "smoke"}))
+    assert texts(smoke).count("not run") == 12
+    assert "smoke scale" in smoke.get_supxlabel()
+
+
+def test_limits_are_those_of_the_criteria(findings):
+    rules = load_criteria()["claims"]
+    drawn = {f.name: {limit for unit in f.units for limit in limits_of(rules[f.name], unit)} for f in findings}
+    assert drawn["C1"] == {0.05, 0.15}
+    assert drawn["C3"] == {-0.25, 0.25}
+    assert drawn["C7"] == {0.5}
+
+
+def test_page_has_verdicts_tables_and_deviations_once(findings):
+    tables = {name: build(evaluation(design(SETTINGS, name), as_the_paper_says), SETTINGS)
+              for name, build in TABLES.items() if name != "table_5"}  # fmt: skip
+    page = results_page(findings, tables, SETTINGS, provenance={"commit": "abc"})
+    assert page.count("sac.minibatch = 128") == 1
+    assert all(f"### {title}" in page for title in ("Table 1", "Table 2", "Table 3", "Table 4", "C1: reproduced"))
+    assert "| commit | abc |" in page
+
+
+def test_verbs_work_on_partial_and_refuse_missing_results(tmp_path, capsys):
+    small = Settings(
+        results=str(tmp_path / "results"),
+        seeds=(0,),
+        irl_seeds=(0,),
+        single_target={"tasks": ("reach-wall",)},
+        multi_target={"tasks": ("reach-wall",), "train_targets": (1,)},
+        multi_task={"train_tasks": ("reach",), "train_targets": (1,), "unseen_tasks": ("push-back",)},
+    )
+    write_json(tmp_path / "settings.json", small.model_dump(mode="json"))
+    settings = ["--settings", read_text(tmp_path / "settings.json")]
+    output = ["--output", str(tmp_path / "out")]
+    assert main(["table", "2", *settings, *output]) == 2
+    complaint = capsys.readouterr().err.strip()
+    assert complaint.count("\n") == 0
+    assert "evaluation.csv" in complaint
+    assert main(["table", "2", "--partial", *settings, *output]) == 0
+    assert "‡" in read_text(tmp_path / "out" / "table_2.md")
+    assert main(["claims", "--partial", *settings, *output]) == 0
+    claims = read_json(tmp_path / "out" / "claims.json")["claims"]
+    assert {claim["verdict"] for claim in claims} == {"not run"}
+    assert (tmp_path / "out" / "claims.png").stat().st_size > 1000
+    assert main(["results", "--partial", *settings, *output]) == 0
+    assert "## Which claims hold" in read_text(tmp_path / "out" / "results.md")

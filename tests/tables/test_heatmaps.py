@@ -1,0 +1,61 @@
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+from mtcsirl.design import design
+from mtcsirl.published import load_published
+from mtcsirl.settings import Settings
+from mtcsirl.tables.heatmaps import heat_map, heat_map_caption, heat_map_matrices
+from tests.analysis.made_up import evaluation
+
+SETTINGS = Settings()
+NAMES = {"action_norm": "table_1", "velocity": "table_3"}
+
+
+def rows(cs_reward):
+    def means(agent):
+        return {cs_reward: 2.4 if agent["stage"] == "transfer" and agent["source"] == agent["task"] else 0.4}
+
+    return evaluation(design(SETTINGS, NAMES[cs_reward]), means, spread=0.1)
+
+
+@pytest.mark.parametrize("cs_reward", NAMES)
+def test_both_panels_share_one_scale_that_holds_every_value(cs_reward):
+    """Ours overshoots the target threefold on the diagonal (velocity): the scale stretches for both panels."""
+    frame = rows(cs_reward)
+    paper, ours, _ = heat_map_matrices(cs_reward, frame, SETTINGS, load_published())
+    figure = heat_map(cs_reward, frame, SETTINGS)
+    assert isinstance(figure, Figure)
+    images = [image for axes in figure.axes for image in axes.get_images()]
+    limits = {image.get_clim() for image in images}
+    assert len(images) == 2
+    assert len(limits) == 1
+    (low, high), *_ = limits
+    assert low == 0
+    assert high >= max(np.nanmax(paper), np.nanmax(ours), 1.0)
+    assert paper.shape == ours.shape == (6, 5)
+    assert paper[0, 0] == load_published().cross_transfer(cs_reward, "reach-wall", "reach-wall").mean
+
+
+def test_incomplete_cells_are_starred_and_missing_ones_empty():
+    frame = rows("velocity")
+    frame.loc[(frame["source"] == "push-back") & (frame["seed"] == 1), "value"] = np.nan
+    frame.loc[(frame["source"] == "drawer-close") & (frame["task"] == "reach-wall"), "value"] = np.nan
+    _, ours, incomplete = heat_map_matrices("velocity", frame, SETTINGS, load_published())
+    assert incomplete.sum() == 6
+    assert np.isnan(ours).sum() == 1
+    texts = [text.get_text() for text in heat_map("velocity", frame, SETTINGS).axes[1].texts]
+    assert len(texts) == 29
+    assert sum(text.endswith("*") for text in texts) == 5
+
+
+def test_nothing_there_yet_still_shows_the_paper():
+    frame = rows("velocity").assign(value=np.nan, status="missing")
+    axes = heat_map("velocity", frame, SETTINGS).axes
+    assert len(axes[0].texts) == 30
+    assert len(axes[1].texts) == 0
+
+
+def test_caption_names_the_table_and_n():
+    assert "Table 3" in heat_map_caption("velocity", SETTINGS)
+    assert "n = 5" in heat_map_caption("velocity", SETTINGS)
