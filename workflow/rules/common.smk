@@ -11,8 +11,8 @@ from mtcsirl.errors import UserError
 from mtcsirl.outputs import OUTPUTS
 from mtcsirl.settings import Settings
 from mtcsirl.settings.loading import validate
-from mtcsirl.settings.study import METHODS
 from mtcsirl.settings.template import as_json
+from mtcsirl.sources import sources
 from mtcsirl.tasks import TASKS
 
 try:
@@ -104,24 +104,6 @@ def learned_task_reward(wildcards):
     return "learned" if run_of(TRANSFER, wildcards).learned_task_reward else "known"
 
 
-def sources(*names):
-    """The modules ``names`` of the package (a folder: all of its modules); listed as input, an edit reruns the rule."""
-    paths = [PACKAGE / name for name in names]
-    found = [file for path in paths for file in (sorted(path.rglob("*.py")) if path.is_dir() else [path])]
-    missing = [str(path) for path in found if not path.is_file()]
-    if missing:
-        raise WorkflowError(f"sources(): no such module: {', '.join(missing)}")
-    return [str(path) for path in found]
-
-
-def own_and_shared(folder, artefact):
-    """The module of ``artefact`` in ``folder`` and those that serve all: an edit of figure_3.py redraws figure 3 only."""
-    kind = artefact.rpartition("_")[0]
-    others = [name for name in ARTEFACTS if name.startswith(kind) and name != artefact]
-    return [path for path in sources(folder) if Path(path).stem not in others]
-
-
-# What decides an agent's numbers beside its settings; glue (storage, stages, command line) is not listed.
-AGENT_SOURCES = sources("environments.py", "fast_metaworld", "agents", "evaluation.py")
-# ... and an IRL run's, beside the file of its method.
-IRL_SOURCES = AGENT_SOURCES + sources("rewards") + [path for path in sources("irl") if Path(path).stem not in METHODS]
+def code(*roots):
+    """The modules that ``roots`` (stages or files) consist of; listed as input, an edit reruns the rule."""
+    return [str(PACKAGE / path) for path in sources(*roots)]

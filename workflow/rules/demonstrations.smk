@@ -7,7 +7,7 @@ rule collect_demonstrations:
     """Episodes of the expert with the task reward, as Parquet."""
     input:
         expert=needed_by(DEMONSTRATIONS, "expert", "policy.json", "policy.safetensors"),
-        code=AGENT_SOURCES,
+        code=code("collect_demonstrations"),
     output:
         **outputs("collect_demonstrations", DEMONSTRATIONS),
     log:

@@ -7,7 +7,7 @@ BASELINE = "sac/{task}-t{target}/s{seed}"
 rule train_expert:
     """SAC on the task reward and the weighted ground-truth common-sense reward."""
     input:
-        code=AGENT_SOURCES + sources("rewards/ground_truth.py"),
+        code=code("train_expert"),
     output:
         **outputs("train_expert", EXPERT),
     log:
@@ -28,7 +28,7 @@ rule train_expert:
 rule train_sac:
     """SAC on the task reward alone."""
     input:
-        code=AGENT_SOURCES,
+        code=code("train_sac"),
     output:
         **outputs("train_sac", BASELINE),
     log:

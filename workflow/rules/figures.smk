@@ -17,7 +17,8 @@ for figure in FIGURES:
             figure
         input:
             rows=rows_of(figure),
-            code=sources("analysis") + own_and_shared("figures", figure),
+            published=PACKAGE / "published.yaml",
+            code=code(f"figures/{figure}.py", "analysis/rows.py", "rendering.py"),
         output:
             pdf=f"<figures>/{figure}.pdf",
             png=report(f"<figures>/{figure}.png", caption=f"../report/{figure}.rst", category="Figures"),

@@ -8,8 +8,7 @@ rule learn_reward:
     """Algorithm 1 or 2 over the demonstrations of T (task, target) pairs."""
     input:
         demonstrations=demonstrations_of(IRL),
-        code=IRL_SOURCES,
-        method=lambda wildcards: sources(f"irl/methods/{wildcards.method}.py"),
+        code=lambda wildcards: code("learn_reward", f"irl/methods/{wildcards.method}.py"),
     output:
         **outputs("learn_reward", IRL),
     log:
@@ -35,7 +34,7 @@ rule score_reward:
         samples=f"<results>/{IRL}/samples.parquet",
         expert=needed_by(SCORE, "expert", "policy.json", "policy.safetensors"),
         baseline=needed_by(SCORE, "baseline", "policy.json", "policy.safetensors"),
-        code=AGENT_SOURCES + sources("rewards", "analysis/correlation.py"),
+        code=code("score_reward"),
     output:
         **outputs("score_reward", SCORE),
     log:

@@ -6,7 +6,8 @@ rule claims:
     input:
         rows=rows_of(None),
         published=PACKAGE / "published.yaml",
-        code=sources("analysis", "published.py"),
+        criteria=PACKAGE / "analysis/claims.yaml",
+        code=code("claims"),
     output:
         json="<results>/claims/claims.json",
         markdown=report("<results>/claims/claims.md", caption="../report/claims.rst", category="Claims"),
@@ -27,7 +28,8 @@ rule report:
         figures=expand("<figures>/{figure}.{ending}", figure=FIGURES, ending=["pdf", "png"]),
         claims=rules.claims.output,
         provenance=[path for run in STUDY for path in files(run, "provenance.json")],
-        code=sources("report"),
+        page=multiext(str(PACKAGE / "report/page"), ".html", ".css"),
+        code=code("report"),
     output:
         "<results>/report/index.html",
     log:

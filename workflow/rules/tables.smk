@@ -10,7 +10,7 @@ for table in TABLES:
         input:
             rows=rows_of(table),
             published=PACKAGE / "published.yaml",
-            code=sources("analysis", "published.py") + own_and_shared("tables", table),
+            code=code(f"tables/{table}.py", "analysis/rows.py"),
         output:
             csv=f"<results>/tables/{table}.csv",
             markdown=report(f"<results>/tables/{table}.md", caption=f"../report/{table}.rst", category="Tables"),

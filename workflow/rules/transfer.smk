@@ -7,7 +7,7 @@ rule transfer:
     """SAC from scratch on the task reward and a learned reward that stays as it is."""
     input:
         reward=needed_by(TRANSFER, "irl", "reward.json", "reward.safetensors"),
-        code=AGENT_SOURCES + sources("rewards"),
+        code=code("transfer"),
     output:
         **outputs("transfer", TRANSFER),
     log:
