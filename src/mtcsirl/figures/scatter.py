@@ -101,7 +101,13 @@ def draw_scatter(axes: Axes, found: Correlation, method: str, cs_reward: str) ->
     standard = standardise(found.points)
     shown = standard.iloc[np.linspace(0, len(standard) - 1, min(SHOWN_POINTS, len(standard))).astype(int)]
     axes.scatter(
-        shown["truth"], shown["learned"], s=3, color=look(method).colour, alpha=0.25, linewidths=0, rasterized=True
+        shown["truth"],
+        shown["learned"],
+        s=3,
+        color=look(method).colour,
+        alpha=float(np.clip(300 / len(shown), 0.25, 0.8)),
+        linewidths=0,
+        rasterized=True,
     )
     if standard["truth"].nunique() > 1:
         slope, offset = np.polyfit(standard["truth"], standard["learned"], 1)
@@ -136,6 +142,8 @@ def correlation_words(estimate: Estimate) -> str:
 def scatter_caption(found: Correlation, cs_reward: str) -> str:
     """What a scatter shows: set, number of points and seeds, correlation with its interval."""
     interval = "95 % t-interval over seeds on Fisher's z scale" if found.estimate.n > 1 else "95 % bootstrap interval"
+    if np.isnan(found.estimate.low):
+        interval = "no interval from so few data"
     paper = "" if np.isnan(found.paper) else f" (paper: {found.paper:.2f})"
     if found.points.empty and np.isnan(found.estimate.value):
         return f"True against learned {quantity(cs_reward)} cs-reward{paper}: {NO_RUNS}."
