@@ -42,6 +42,7 @@ def irl_settings(**irl) -> IrlRunSettings:
         "discriminator_updates": 4,
         "generator_updates": 6,
         "generator_replay": 2,
+        "centre": True,
         "discriminator": discriminator,
     } | irl
     settings = IrlSettings(**chosen)

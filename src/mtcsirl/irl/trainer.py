@@ -117,8 +117,10 @@ class IrlTrainer:
         A constant in every reward changes no preference between policies, but shifts the critics' target by a hundred
         times (1 / (1 - gamma)) its value: f starts near log pi - r_task, about -13, whatever it has to say.
         """
+        if not self.irl.centre:
+            return torch.zeros(len(self.world.members), 1)
         latest = self.replay.latest(min(CENTRED, self.replay.size))
-        return network(latest).mean(dim=1, keepdim=True) * float(self.irl.centre)
+        return network(latest).mean(dim=1, keepdim=True)
 
     # --- discriminators -----------------------------------------------------------------------------------------
 

@@ -81,9 +81,9 @@ class IrlSettings(Frozen):
     task_reward_scale: float = key(1.0, "factor on r_task in logit and policy reward", paper=1.0, gt=0)
     cs_weight: float = key(1.0, "alpha: factor on f in the policy reward beside the curriculum", paper=1.0, gt=0)
     centre: bool = key(
-        True,
+        False,
         "subtract from f its mean over the generators' last transitions, in the policy reward and in what is saved:"
-        " no preference changes, but critics start near the right level",
+        " no preference changes, the critics' targets move less",
         paper=False,
     )
     temperature: Temperature = key(1.0, "generators: automatic or fixed entropy temperature", paper="automatic")
