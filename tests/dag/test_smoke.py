@@ -17,7 +17,7 @@ from mtcsirl.rewards.learned import load_learned_reward
 from mtcsirl.settings import Settings
 from mtcsirl.status import DONE, study_status
 from mtcsirl.study import Baseline, Expert, IrlRun, Study, Transfer
-from tests.dag.conftest import SMOKE, Snakemake
+from tests.dag.conftest import RENDERED, RENDERS, SMOKE, Snakemake, needs_rendering
 
 pytestmark = pytest.mark.dag
 NOTE = "smoke scale: numbers mean nothing"
@@ -188,6 +188,8 @@ def test_tables_exist_in_three_forms_and_say_the_scale(results: Path, number: in
 
 @pytest.mark.parametrize("figure", [name for name in ARTEFACTS if name.startswith("figure_")])
 def test_figures_exist_as_pdf_and_png(figures: Path, figure: str) -> None:
+    if figure in RENDERED and not RENDERS:
+        pytest.skip("Debian's package libosmesa6 is not installed")
     pdf, png = (figures / f"{figure}.{ending}" for ending in ("pdf", "png"))
     assert pdf.read_bytes().startswith(b"%PDF")
     assert png.read_bytes().startswith(b"\x89PNG")
@@ -201,6 +203,7 @@ def test_no_claim_is_judged_on_smoke(results: Path) -> None:
     assert NOTE in (results / "claims/claims.md").read_text()
 
 
+@needs_rendering
 def test_the_report_shows_every_artefact(results: Path) -> None:
     page = (results / "report/index.html").read_text()
     assert NOTE in page
@@ -240,6 +243,7 @@ def test_a_table_of_partial_results_marks_what_is_missing(
     assert "missing" in (tmp_path / "table_2.md").read_text().lower()
 
 
+@needs_rendering
 def test_snakemakes_own_report(smoke: Path, snakemake: Snakemake, tmp_path: Path) -> None:
     done = snakemake("all", *SMOKE, "--report", str(tmp_path / "report.zip"))
     assert done.returncode == 0, done.stderr[-3000:]

@@ -9,12 +9,24 @@ from mtcsirl.design import ARTEFACTS, design
 from mtcsirl.settings import Settings
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from mtcsirl.analysis.claims import Finding
+
+HEAT_MAPS = {"table_1": "action_norm", "table_3": "velocity"}
+"""Tables that are also drawn, beside the paper's, and their cs-reward."""
 
 
 def register(verbs: Verbs) -> None:
     """Add the verbs."""
-    _add(verbs, "table", _table, does="make one of the paper's tables", writes="table_N.csv, .md, .tex", numbered=True)
+    _add(
+        verbs,
+        "table",
+        _table,
+        does="make one of the paper's tables",
+        writes="table_N.csv, .md, .tex (1, 3: .pdf, .png)",
+        numbered=True,
+    )
     _add(verbs, "figure", _figure, does="draw one of the paper's figures", writes="figure_N.pdf, .png", numbered=True)
     _add(verbs, "claims", _claims, does="judge the paper's claims", writes="claims.json, .md, .pdf, .png")
     _add(verbs, "results", _results, does="write verdicts and tables as one Markdown page", writes="results.md")
@@ -51,6 +63,11 @@ def _table(parsed: argparse.Namespace) -> None:
     write_csv(folder / f"{name}.csv", table.csv())
     write_text(folder / f"{name}.md", table.markdown())
     write_text(folder / f"{name}.tex", table.latex())
+    if name in HEAT_MAPS:
+        from mtcsirl.tables.heatmaps import heat_map, heat_map_caption
+
+        cs_reward = HEAT_MAPS[name]
+        _write_figure(folder / name, heat_map(cs_reward, rows, settings), heat_map_caption(cs_reward, settings))
     print(table.markdown())
 
 
@@ -58,8 +75,6 @@ def _figure(parsed: argparse.Namespace) -> None:
     from mtcsirl.analysis.rows import curve_rows, point_rows, score_rows
     from mtcsirl.figures import figure_spec
     from mtcsirl.figures.data import FigureData
-    from mtcsirl.figures.style import figure_bytes
-    from mtcsirl.storage import write_bytes
 
     settings = study_settings(parsed)
     name = f"figure_{parsed.number}"
@@ -69,17 +84,23 @@ def _figure(parsed: argparse.Namespace) -> None:
     spec = figure_spec(name)
     data = FigureData(settings=settings, **frames)
     figure, caption = spec.draw(data), spec.caption(data)
-    folder = parsed.output or Path(settings.figures)
-    write_bytes(folder / f"{name}.pdf", figure_bytes(figure, "pdf", caption))
-    write_bytes(folder / f"{name}.png", figure_bytes(figure, "png", caption))
+    _write_figure((parsed.output or Path(settings.figures)) / name, figure, caption)
     print(f"{spec.title}. {caption}")
+
+
+def _write_figure(path: Path, figure: "Figure", caption: str) -> None:
+    """Write ``path``.pdf and .png."""
+    from mtcsirl.figures.style import figure_bytes
+    from mtcsirl.storage import write_bytes
+
+    write_bytes(path.with_suffix(".pdf"), figure_bytes(figure, "pdf", caption))
+    write_bytes(path.with_suffix(".png"), figure_bytes(figure, "png", caption))
 
 
 def _claims(parsed: argparse.Namespace) -> None:
     from mtcsirl.analysis.claims import claims_json, claims_markdown
     from mtcsirl.analysis.claims_figure import CAPTION, claims_figure
-    from mtcsirl.figures.style import figure_bytes
-    from mtcsirl.storage import write_bytes, write_json, write_text
+    from mtcsirl.storage import write_json, write_text
 
     settings = study_settings(parsed)
     findings = _judged(settings, parsed.partial)
@@ -87,9 +108,7 @@ def _claims(parsed: argparse.Namespace) -> None:
     text = claims_markdown(findings, settings)
     write_json(folder / "claims.json", claims_json(findings, settings))
     write_text(folder / "claims.md", text)
-    figure = claims_figure(findings, settings)
-    write_bytes(folder / "claims.pdf", figure_bytes(figure, "pdf", CAPTION))
-    write_bytes(folder / "claims.png", figure_bytes(figure, "png", CAPTION))
+    _write_figure(folder / "claims", claims_figure(findings, settings), CAPTION)
     print(text)
 
 

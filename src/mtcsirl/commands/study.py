@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 from mtcsirl.commands.arguments import Verbs, add_study_settings, add_verb, study_settings
 from mtcsirl.design import ARTEFACTS, design
-from mtcsirl.errors import UserError
 
 if TYPE_CHECKING:
     from mtcsirl.plan import Rates
@@ -67,8 +66,8 @@ def register(verbs: Verbs) -> None:
         verbs,
         "calibrate",
         _calibrate,
-        does="measure this machine's rates, one core, about a minute",
-        needs="an idle core",
+        does="measure this machine's rates, about two minutes",
+        needs="a machine that has nothing else to do",
         writes="the file that plan reads, --output",
     )
     calibrate.add_argument("--output", type=Path, required=True, metavar="FILE", help="a JSON file")
@@ -168,4 +167,8 @@ def _settings(parsed: argparse.Namespace) -> None:
 
 
 def _calibrate(parsed: argparse.Namespace) -> None:
-    raise UserError("calibrate: not built yet")
+    from mtcsirl.calibration import calibrate
+    from mtcsirl.storage import write_json
+
+    write_json(parsed.output, calibrate().model_dump(mode="json"))
+    print(parsed.output)
