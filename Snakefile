@@ -1,8 +1,15 @@
-"""The replication as one DAG. Every table and figure is a target of its own: snakemake --cores 2 figure_3"""
+"""The replication as one DAG. Every table and figure is a target of its own: snakemake --cores 2 figure_3
+
+`snakemake --lint` asks for a conda environment or container per rule; there is none on purpose: one environment, pinned
+in constraints.txt, serves all rules.
+"""
 
 from snakemake.utils import min_version
 
 min_version("9.0")
+
+
+report: "workflow/report/workflow.rst"
 
 
 configfile: f"{workflow.basedir}/config/config.yaml"

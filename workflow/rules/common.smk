@@ -28,6 +28,10 @@ PACKAGE = Path(os.path.relpath(Path(workflow.basedir) / "src/mtcsirl"))
 os.environ["PATH"] = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
 
 
+envvars:
+    "PATH",
+
+
 pathvars:
     results=SETTINGS.results,
     figures=SETTINGS.figures,

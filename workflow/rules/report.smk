@@ -11,6 +11,8 @@ rule claims:
     output:
         json="<results>/claims/claims.json",
         markdown=report("<results>/claims/claims.md", caption="../report/claims.rst", category="Claims"),
+        pdf="<results>/claims/claims.pdf",
+        png=report("<results>/claims/claims.png", caption="../report/claims.rst", category="Claims"),
     log:
         "<logs>/claims.log",
     threads: 1
@@ -25,13 +27,14 @@ rule report:
     """One page that opens in a browser: what was run, verdicts, tables, figures, gates, deviations."""
     input:
         tables=expand("<results>/tables/{table}.{ending}", table=TABLES, ending=["csv", "md", "tex"]),
+        heat_maps=expand("<results>/tables/{table}.png", table=HEAT_MAPS),
         figures=expand("<figures>/{figure}.{ending}", figure=FIGURES, ending=["pdf", "png"]),
         claims=rules.claims.output,
         provenance=[path for run in STUDY for path in files(run, "provenance.json")],
         page=multiext(str(PACKAGE / "report/page"), ".html", ".css"),
         code=code("report"),
     output:
-        "<results>/report/index.html",
+        report("<results>/report/index.html", caption="../report/start.rst", category="Start page"),
     log:
         "<logs>/report.log",
     threads: 1

@@ -1,6 +1,7 @@
 """The paper's tables: targets table_1 ... table_5, each as CSV, Markdown and LaTeX."""
 
 TABLES = [name for name in ARTEFACTS if name.startswith("table_")]
+HEAT_MAPS = ["table_1", "table_3"]  # drawn beside the paper's as well
 
 for table in TABLES:
 
@@ -10,11 +11,12 @@ for table in TABLES:
         input:
             rows=rows_of(table),
             published=PACKAGE / "published.yaml",
-            code=code(f"tables/{table}.py", "analysis/rows.py"),
+            code=code(f"tables/{table}.py", "analysis/rows.py", *["tables/heatmaps.py"][: table in HEAT_MAPS]),
         output:
             csv=f"<results>/tables/{table}.csv",
             markdown=report(f"<results>/tables/{table}.md", caption=f"../report/{table}.rst", category="Tables"),
             latex=f"<results>/tables/{table}.tex",
+            heat_map=[f"<results>/tables/{table}.{ending}" for ending in ("pdf", "png") if table in HEAT_MAPS],
         log:
             f"<logs>/tables/{table}.log",
         threads: 1
