@@ -30,7 +30,7 @@ ROOTS: dict[str, tuple[str, ...]] = {
     "learn_reward": ("irl/run.py",),
     "transfer": ("agents/training.py", "rewards/learned.py"),
     "score_reward": ("scoring.py",),
-    "claims": ("analysis/claims.py", "analysis/rows.py"),
+    "claims": ("analysis/claims.py", "analysis/claims_figure.py", "analysis/rows.py"),
     "report": ("report/collect.py", "report/page.py"),
 }
 """The modules that each stage calls. A method and an artefact add their own file."""

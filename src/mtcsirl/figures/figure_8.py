@@ -112,13 +112,17 @@ def caption(data: FigureData) -> str:
     return (
         "Single target: the reward is learned and tried on the same "
         f"task and target; it is repeated for {', '.join(data.settings.single_target.tasks)}. Multi target: learned "
-        f"from {len(data.settings.multi_target.train_targets)} targets of one task (here "
+        f"from {_targets(data.settings.multi_target.train_targets)} of one task (here "
         f"{data.settings.multi_target.tasks[0]}; repeated for each task), tried on a new target of every task. "
-        f"Multi task: learned from {len(several.train_tasks)} tasks with {len(several.train_targets)} "
-        f"{'target' if len(several.train_targets) == 1 else 'targets'} each (one is shown), tried on unseen tasks. "
+        f"Multi task: learned from {len(several.train_tasks)} tasks with {_targets(several.train_targets)} "
+        "each (one is shown), tried on unseen tasks. "
         "Target n is Meta-World's n-th variation of the task; the ring is its goal as the observation has it. "
         "Camera: corner2, turned upright."
     )
+
+
+def _targets(targets: tuple[int, ...]) -> str:
+    return "1 target" if len(targets) == 1 else f"{len(targets)} targets"
 
 
 def _draw_block(figure: Figure, block: Setup, shots: Mapping[Scene, Shot], top: float) -> None:
