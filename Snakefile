@@ -28,4 +28,7 @@ include: "workflow/rules/report.smk"
 rule all:
     default_target: True
     input:
+        rules.report.input.tables,
+        rules.report.input.figures,
+        rules.claims.output,
         rules.report.output,
