@@ -33,7 +33,7 @@ def calibrate() -> Rates:
     steps = {task: environment_step(task) for task in dict.fromkeys((*SINGLE_TASKS, *TRAIN_TASKS))}
     found = machine()
     return Rates(
-        machine=f"{found['processor']}, {found['cores']} cores, {found['system']}",
+        machine=f"{found['processor']}, {found['cores']} cores",
         start_up=_start_up(),
         environment_step={"default": round(statistics.median(steps.values()), 7), **steps},
         action=_seconds(_acting(), 200),
