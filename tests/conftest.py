@@ -1,12 +1,14 @@
-"""What all tests share: the checkout, its configuration, one thread."""
+"""What all tests share: the checkout, and one thread for numerical libraries, as in every job."""
 
 import os
 from pathlib import Path
 
-for _name in ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
-    os.environ.setdefault(_name, "1")
-
 import pytest
+
+from mtcsirl.cli import THREADS
+
+for _name in THREADS:
+    os.environ.setdefault(_name, "1")
 
 CHECKOUT = Path(__file__).resolve().parents[1]
 
