@@ -140,7 +140,7 @@ def test_a_changed_key_changes_only_the_runs_that_read_it() -> None:
     after = Settings(irl={"iterations": before.irl.iterations + 1})
     changed = {run.stage for run in design(before) if run.settings(before) != run.settings(after)}
     assert changed == {"learn_reward"}
-    after = Settings(transfer={"steps": {"default": 40_000, "reach-wall": 1}})
+    after = Settings(transfer={"steps": {**before.transfer.steps, "reach-wall": 1}})
     changed_runs = [run for run in design(before) if run.settings(before) != run.settings(after)]
     assert {(run.stage, run.task) for run in changed_runs} == {("transfer", "reach-wall")}  # type: ignore[union-attr]
 

@@ -1,7 +1,7 @@
 """One function per stage of the DAG: what the command line and a notebook call.
 
-Each takes the settings of its run, the run's key and the folder it fills; it holds the folder's lock, resumes a run that
-was killed and leaves ``settings.json`` and ``provenance.json`` beside its results.
+Each takes the settings of its run, the run's key and the folder it fills; it holds the folder's lock, resumes a run
+that was killed and leaves ``settings.json`` and ``provenance.json`` beside its results.
 """
 
 from collections.abc import Iterator, Sequence
@@ -26,10 +26,8 @@ from mtcsirl.settings.runs import (
 CHECKPOINT = "checkpoint.safetensors"
 
 
-def train_expert(
-    settings: AgentRunSettings, task: str, target: int, cs_reward: str, seed: int, output: Path
-) -> None:
-    """Train SAC on r_task + C alpha r_cs and keep the best policy by the expert's gate (sections 4 and 5, appendix B)."""
+def train_expert(settings: AgentRunSettings, task: str, target: int, cs_reward: str, seed: int, output: Path) -> None:
+    """Train SAC on r_task + C alpha r_cs and keep the best policy by the expert's gate (appendix B)."""
     f = ground_truth(cs_reward, settings.environment.observation)
     _train(AgentJob(task, target, seed, settings, cs_reward, f=f, gate="expert"), output)
 

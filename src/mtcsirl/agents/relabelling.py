@@ -55,6 +55,8 @@ class PolicyReward:
         self.curriculum = Curriculum(agents) if any(mixture.curriculum for mixture in mixtures) else None
         self._f = _group([mixture.f for mixture in mixtures])
         self._task_reward = _group([mixture.task_reward for mixture in mixtures])
+        self.warming_up = False
+        """While set, f does not count: the agents learn their task first."""
 
     @torch.no_grad()
     def __call__(self, transitions: Transitions) -> Tensor:
@@ -62,7 +64,7 @@ class PolicyReward:
         total = transitions.task_reward
         if self._task_reward:
             total = _apply(self._task_reward, transitions, otherwise=total)
-        if self._f:
+        if self._f and not self.warming_up:
             f = _apply(self._f, transitions, otherwise=torch.zeros_like(total))
             total = total + self._weight() * f
         return self._scale * total

@@ -157,6 +157,7 @@ class Training:
         """Catch up with updates_per_step gradient steps per environment step after the random ones."""
         sac = self.settings.sac
         due = int((self.step - sac.random_steps) * sac.updates_per_step)
+        self._reward.warming_up = self.step <= self.settings.warm_up_steps
         while self.learner.updates < due:
             batch = self.replay.sample(sac.minibatch)
             self.learner.update(batch.observation, batch.action, self._reward(batch), batch.next_observation)

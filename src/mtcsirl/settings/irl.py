@@ -100,9 +100,6 @@ class IrlSettings(Frozen):
 class TransferSettings(RewardScaleSettings):
     """New agents from scratch on r_task + f with f frozen."""
 
-    temperature: Temperature = key(1.0, "automatic or a fixed entropy temperature", paper="automatic")
-    initial_temperature: float = key(1.0, "start of the automatic temperature", gt=0)
-    reward_scale: float = key(1.0, "factor on the whole reward that SAC sees", paper=1.0, gt=0)
     cs_weight: float = key(1.0, "factor on f beside r_task (section 3.3: standard aggregation)", paper=1.0, gt=0)
     curriculum: bool = key(False, "weight f by r_ave / R_MAX as during IRL (section 3.3: no)", paper=False)
 

@@ -58,11 +58,11 @@ class RewardScaleSettings(Frozen):
     """What differs between experts, baselines, generators and transfer agents: temperature and reward scale."""
 
     temperature: Temperature = key("automatic", "automatic or a fixed entropy temperature", paper="automatic")
-    initial_temperature: float = key(0.1, "start of the automatic temperature", gt=0)
+    initial_temperature: float = key(0.05, "start of the automatic temperature", gt=0)
     target_entropy: Literal["automatic"] | float = key(
         "automatic", "automatic = minus the action dimension", unit="nats"
     )
-    reward_scale: float = key(0.1, "factor on the whole reward that SAC sees", paper=1.0, gt=0)
+    reward_scale: float = key(1.0, "factor on the whole reward that SAC sees", paper=1.0, gt=0)
 
     def sac(self, learner: LearnerSettings) -> SacSettings:
         """The whole agent: ``learner`` with this temperature and scale."""

@@ -29,6 +29,7 @@ class AgentRunSettings(Frozen):
         default=0.0, ge=0, description="weight of the cs-reward (ground truth or learned) beside r_task"
     )
     curriculum: bool = Field(default=False, description="weight the cs-reward by r_ave / R_MAX over 256 steps")
+    warm_up_steps: int = Field(default=0, ge=0, description="environment steps before the cs-reward counts")
     evaluation: EvaluationSettings = Field(default_factory=EvaluationSettings)
     gates: GateSettings = Field(default_factory=GateSettings)
     progress: ProgressSettings = Field(default_factory=ProgressSettings)
@@ -83,6 +84,7 @@ def expert_run(settings: Settings, task: str, cs_reward: str) -> AgentRunSetting
         steps_for(expert.steps, task),
         cs_weight=expert.cs_weight.get(cs_reward, 1.0),
         curriculum=expert.curriculum,
+        warm_up_steps=expert.warm_up_steps,
     )
 
 

@@ -112,13 +112,20 @@ class ExpertSettings(RewardScaleSettings):
     """SAC on r_task + weighted ground-truth cs-reward."""
 
     steps: Budget = key(
-        lambda: {"default": 40_000},
+        lambda: {"default": 60_000, "push-back": 120_000},
         "training budget per task",
         unit="environment steps",
-        paper={"default": 250_000},
+        paper={"default": 250_000, "push-back": 250_000},
+    )
+    warm_up_steps: int = key(
+        12_000,
+        "steps on r_task alone before the cs-reward counts; without them late-paying tasks learn the behaviour only",
+        unit="environment steps",
+        paper=0,
+        ge=0,
     )
     cs_weight: dict[CsReward, Annotated[float, Field(gt=0)]] = key(
-        lambda: {"velocity": 20.0, "action_norm": 5.0},
+        lambda: {"velocity": 20.0, "action_norm": 15.0},
         "C_v, C_n: weight of the ground-truth cs-reward beside r_task in [0, 10]",
     )
     curriculum: bool = key(
@@ -130,10 +137,10 @@ class BaselineSettings(RewardScaleSettings):
     """SAC on r_task alone."""
 
     steps: Budget = key(
-        lambda: {"default": 40_000},
+        lambda: {"default": 40_000, "push-back": 100_000},
         "training budget per task",
         unit="environment steps",
-        paper={"default": 250_000},
+        paper={"default": 250_000, "push-back": 250_000},
     )
 
 
@@ -152,10 +159,10 @@ class TransferStudySettings(TransferSettings):
     """Transfer agents with their budget."""
 
     steps: Budget = key(
-        lambda: {"default": 40_000},
+        lambda: {"default": 40_000, "push-back": 100_000},
         "training budget per task",
         unit="environment steps",
-        paper={"default": 250_000},
+        paper={"default": 250_000, "push-back": 250_000},
     )
 
 
