@@ -15,6 +15,7 @@ TARGETS = {"velocity": 0.8, "action_norm": 3.0}
 SAC = {"velocity": 0.32, "action_norm": 1.57}
 CORRELATIONS = {"single_target": 0.18, "multi_task": 0.87}
 SPREAD = 0.03
+CLAIMS = tuple(load_criteria()["claims"])
 
 
 @cache
@@ -83,8 +84,7 @@ def rows_of(means, spread=SPREAD, settings=SETTINGS):
     return rows[(rows["policy"] == "stochastic") & (rows["metric"] != "task_reward")].reset_index(drop=True)
 
 
-def finding(
-    name,
+def judge_all(
     means=as_the_paper_says,
     *,
     spread=SPREAD,
@@ -92,11 +92,22 @@ def finding(
     correlations=CORRELATIONS,
     change=lambda rows: rows,
     rescore=lambda frame: frame,
+    names=None,
 ):
-    """The finding on one claim; ``change`` and ``rescore`` may alter rows and scores last."""
-    criteria = load_criteria() | {"claims": {name: load_criteria()["claims"][name]}}
+    """The findings on all claims or those called ``names``; ``change``, ``rescore`` may alter rows, scores last."""
+    claims = {name: claim for name, claim in load_criteria()["claims"].items() if name in (names or CLAIMS)}
     rows = change(rows_of(means, spread, settings))
-    return judge(rows, rescore(scores(correlations, settings)), settings, criteria)[0]
+    return judge(rows, rescore(scores(correlations, settings)), settings, load_criteria() | {"claims": claims})
+
+
+def finding(name, means=as_the_paper_says, **options):
+    """The finding on one claim."""
+    return judge_all(means, names=(name,), **options)[0]
+
+
+def verdicts(means=as_the_paper_says, **options):
+    """The verdict on each claim."""
+    return {finding.name: finding.verdict for finding in judge_all(means, **options)}
 
 
 def verdict(name, means=as_the_paper_says, **options):

@@ -47,11 +47,11 @@ def test_limits_are_those_of_the_criteria(findings):
 
 
 def test_page_has_verdicts_tables_and_deviations_once(findings):
-    tables = {name: build(evaluation(design(SETTINGS, name), as_the_paper_says), SETTINGS)
-              for name, build in TABLES.items() if name != "table_5"}  # fmt: skip
+    rows = {name: evaluation(design(SETTINGS, name), as_the_paper_says) for name in ("table_2", "table_4")}
+    tables = {name: TABLES[name](frame, SETTINGS) for name, frame in rows.items()}
     page = results_page(findings, tables, SETTINGS, provenance={"commit": "abc"})
     assert page.count("sac.minibatch = 128") == 1
-    assert all(f"### {title}" in page for title in ("Table 1", "Table 2", "Table 3", "Table 4", "C1: reproduced"))
+    assert all(f"### {title}" in page for title in ("Table 2", "Table 4", "C1: reproduced"))
     assert "| commit | abc |" in page
 
 

@@ -3,7 +3,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy import stats
@@ -26,6 +26,8 @@ from mtcsirl.analysis.statistics import (
 
 RLIABLE = json.loads((Path(__file__).parents[1] / "data" / "rliable.json").read_text())
 DATA = {name: np.array(values) for name, values in RLIABLE["data"].items()}
+settings.register_profile("busy", max_examples=40, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.load_profile("busy")  # a busy machine is no reason to fail
 numbers = st.floats(-1e3, 1e3, allow_nan=False).map(lambda x: round(x, 3))
 seeds = st.lists(numbers, min_size=2, max_size=9)
 matrices = st.integers(1, 4).flatmap(

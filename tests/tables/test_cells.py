@@ -26,6 +26,8 @@ def test_seeds_are_averaged_after_tasks():
     assert cell.ours == pytest.approx((0.6, 0.1, 3))
     assert cell.interval == pytest.approx((0.6 - 0.24841, 0.6 + 0.24841), abs=1e-4)
     assert cell.deterministic == pytest.approx(0.5)
+    assert cell.iqm.value == pytest.approx(np.mean([0.5, 0.6, 0.6, 0.7])), "of the six values, without the extremes"
+    assert cell.iqm.low < cell.iqm.value < cell.iqm.high
 
 
 def test_inside_and_outside_the_papers_prediction_interval():

@@ -8,7 +8,9 @@ from mtcsirl.settings import Settings
 from mtcsirl.tables.heatmaps import heat_map, heat_map_caption, heat_map_matrices
 from tests.analysis.made_up import evaluation
 
-SETTINGS = Settings()
+SETTINGS = Settings(
+    seeds=(0, 1), multi_target={"tasks": ("reach-wall", "drawer-close", "push-back"), "train_targets": (1, 2)}
+)
 NAMES = {"action_norm": "table_1", "velocity": "table_3"}
 
 
@@ -33,7 +35,7 @@ def test_both_panels_share_one_scale_that_holds_every_value(cs_reward):
     (low, high), *_ = limits
     assert low == 0
     assert high >= max(np.nanmax(paper), np.nanmax(ours), 1.0)
-    assert paper.shape == ours.shape == (6, 5)
+    assert paper.shape == ours.shape == (4, 3)
     assert paper[0, 0] == load_published().cross_transfer(cs_reward, "reach-wall", "reach-wall").mean
 
 
@@ -42,20 +44,20 @@ def test_incomplete_cells_are_starred_and_missing_ones_empty():
     frame.loc[(frame["source"] == "push-back") & (frame["seed"] == 1), "value"] = np.nan
     frame.loc[(frame["source"] == "drawer-close") & (frame["task"] == "reach-wall"), "value"] = np.nan
     _, ours, incomplete = heat_map_matrices("velocity", frame, SETTINGS, load_published())
-    assert incomplete.sum() == 6
+    assert incomplete.sum() == 4
     assert np.isnan(ours).sum() == 1
     texts = [text.get_text() for text in heat_map("velocity", frame, SETTINGS).axes[1].texts]
-    assert len(texts) == 29
-    assert sum(text.endswith("*") for text in texts) == 5
+    assert len(texts) == 11
+    assert sum(text.endswith("*") for text in texts) == 3
 
 
 def test_nothing_there_yet_still_shows_the_paper():
     frame = rows("velocity").assign(value=np.nan, status="missing")
     axes = heat_map("velocity", frame, SETTINGS).axes
-    assert len(axes[0].texts) == 30
+    assert len(axes[0].texts) == 12
     assert len(axes[1].texts) == 0
 
 
 def test_caption_names_the_table_and_n():
     assert "Table 3" in heat_map_caption("velocity", SETTINGS)
-    assert "n = 5" in heat_map_caption("velocity", SETTINGS)
+    assert "n = 2" in heat_map_caption("velocity", SETTINGS)

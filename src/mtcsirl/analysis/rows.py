@@ -94,11 +94,10 @@ def _joined(frames: list[pd.DataFrame], columns: tuple[str, ...]) -> pd.DataFram
 
 def select(rows: pd.DataFrame, **key: Any) -> pd.DataFrame:
     """The rows whose columns have these values; a tuple or list means any of them."""
-    chosen = np.ones(len(rows), dtype=bool)
     for name, value in key.items():
         column = rows[name]
-        chosen &= column.isin(list(value)) if isinstance(value, tuple | list) else column == value
-    return rows[chosen]
+        rows = rows[column.isin(list(value)) if isinstance(value, tuple | list) else column == value]
+    return rows
 
 
 def matrix(rows: pd.DataFrame) -> pd.DataFrame:

@@ -21,8 +21,9 @@ REMARKS = (
     "beyond five seeds; the prediction interval takes it as the standard deviation over seeds.",
     "A printed spread of 0 gives no prediction interval; those of the other success rates are narrower than one "
     "episode of ours: read the distance there, not inside or outside.",
-    "Stochastic policies, as trained. The CSV has the means of the deterministic ones, and interquartile means over seeds "
-    "x tasks with stratified bootstrap intervals, which at five seeds are too short (84 % coverage): go by the t-interval.",
+    "Stochastic policies, as trained. The CSV has the means of the deterministic ones, and interquartile means over "
+    "seeds x tasks with stratified bootstrap intervals; those are too short at five seeds (84 % coverage): go by the "
+    "t-interval.",
 )
 
 
