@@ -62,7 +62,7 @@ def test_same_parameters_after_100_updates(temperature):
             rows.actions[None],
             rows.rewards[None, :, 0],
             rows.next_observations[None],
-            noise[:, None],
+            noise[None],
         )
 
     reference = FusedSac(1, settings, seeds=[1])

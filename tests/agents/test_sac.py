@@ -18,7 +18,7 @@ def update(learner, transitions, noise=None):
 
 def noise_for(agents, seed=0, dtype=torch.float32):
     generator = torch.Generator().manual_seed(seed)
-    return torch.randn(2, agents, MINIBATCH, 4, generator=generator, dtype=dtype)
+    return torch.randn(agents, 2, MINIBATCH, 4, generator=generator, dtype=dtype)
 
 
 def run(stack, index, inputs):
@@ -58,7 +58,7 @@ def test_one_update_follows_the_gradients_of_the_losses():
     loss = torch.zeros((), dtype=double)
     for agent in range(agents):
         with torch.no_grad():
-            next_action, next_log_prob = draw(wrong, agent, following[agent], noise[1, agent])
+            next_action, next_log_prob = draw(wrong, agent, following[agent], noise[agent, 1])
             inputs = torch.cat((following[agent], next_action), -1)
             values = torch.stack([run(wrong.target_critics, c * agents + agent, inputs) for c in range(2)])
             target = reward[agent] + 0.99 * (values.amin(0)[:, 0] - 0.2 * next_log_prob)
@@ -77,7 +77,7 @@ def test_one_update_follows_the_gradients_of_the_losses():
     actor.weights, actor.biases = actor._views(actor.parameters)
     loss = torch.zeros((), dtype=double)
     for agent in range(agents):
-        drawn, log_prob = draw(wrong, agent, observation[agent], noise[0, agent])
+        drawn, log_prob = draw(wrong, agent, observation[agent], noise[agent, 0])
         inputs = torch.cat((observation[agent], drawn), -1)
         values = torch.cat([run(learner.critics, c * agents + agent, inputs) for c in range(2)], -1)
         loss = loss + (0.2 * log_prob - values.amin(-1)).mean()
@@ -100,7 +100,7 @@ def test_agents_in_one_program_learn_as_they_do_alone(small_sac, temperature):
         batch, noise = random_transitions(3, MINIBATCH, seed=step), noise_for(3, seed=step)
         update(together, batch, noise)
         for agent, learner in enumerate(alone):
-            update(learner, [tensor[agent : agent + 1] for tensor in batch], noise[:, agent : agent + 1])
+            update(learner, [tensor[agent : agent + 1] for tensor in batch], noise[agent : agent + 1])
     for agent, learner in enumerate(alone):
         own = {"rtol": 1e-4, "atol": 1e-5}
         torch.testing.assert_close(together.actor.parameters[agent], learner.actor.parameters[0], **own)

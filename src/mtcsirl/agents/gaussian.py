@@ -45,9 +45,7 @@ def squashed_sample(head: Tensor, noise: Tensor, min_log_std: float, max_log_std
     return SquashedSample(action, log_prob, deviation, slope, log_std == raw_log_std)
 
 
-def squashed_sample_gradient(
-    sample: SquashedSample, action_gradient: Tensor, log_prob_gradient: Tensor
-) -> Tensor:
+def squashed_sample_gradient(sample: SquashedSample, action_gradient: Tensor, log_prob_gradient: Tensor) -> Tensor:
     """dL/d head [..., 2 x action], given dL/d action [..., action] and dL/d log_prob [..., 1].
 
     dL/du = (dL/da + dL/dlogp x 2 a / (1 - a^2 + 1e-6)) (1 - a^2);

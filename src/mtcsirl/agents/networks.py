@@ -16,12 +16,13 @@ class Workspace:
     [G, B, size]. What a pass returns stays valid until the next pass through the same workspace.
     """
 
-    def __init__(self, networks: int, minibatch: int, sizes: Sequence[int], like: Tensor) -> None:
-        def shaped(size: int) -> Tensor:
-            return torch.empty(networks, minibatch, size, device=like.device, dtype=like.dtype)
+    def __init__(self, activations: list[Tensor]) -> None:
+        self.activations = activations
+        self.deltas = [torch.empty_like(tensor, memory_format=torch.contiguous_format) for tensor in activations]
 
-        self.activations = [shaped(size) for size in sizes]
-        self.deltas = [shaped(size) for size in sizes]
+    def first_rows(self, rows: int) -> Workspace:
+        """The same pass, for a backward pass through its first rows alone."""
+        return Workspace([tensor[:, :rows] for tensor in self.activations])
 
 
 class NetworkStack:
@@ -66,7 +67,7 @@ class NetworkStack:
 
     def workspace(self, minibatch: int) -> Workspace:
         """Memory for passes of this many rows per network."""
-        return Workspace(len(self.parameters), minibatch, self.sizes, self.parameters)
+        return Workspace([self.parameters.new_empty(len(self.parameters), minibatch, size) for size in self.sizes])
 
     def forward(self, inputs: Tensor, workspace: Workspace) -> Tensor:
         """inputs [G, B, in] -> outputs [G, B, out]; the workspace keeps every layer for the backward pass."""
@@ -96,7 +97,9 @@ class NetworkStack:
         delta = output_gradient
         yield len(self.weights) - 1, delta
         for layer in range(len(self.weights) - 1, 0, -1):
-            delta = torch.bmm(delta, self.weights[layer], out=workspace.deltas[layer])
+            # The product with a single column is an outer one, which multiplies faster than a matrix product.
+            product = torch.mul if delta.shape[-1] == 1 else torch.bmm
+            delta = product(delta, self.weights[layer], out=workspace.deltas[layer])
             relu_backward = torch.ops.aten.threshold_backward.grad_input
             relu_backward(delta, workspace.activations[layer], 0.0, grad_input=delta)
             yield layer - 1, delta

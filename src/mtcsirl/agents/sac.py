@@ -132,11 +132,11 @@ class FusedSac:
         """One gradient step of every agent on its own minibatch.
 
         observation, next_observation [A, B, 39]; action [A, B, 4]; reward [A, B], already scaled;
-        noise [2, A, B, 4] standard normal, of the actions in s and in s'; drawn here if not given.
+        noise [A, 2, B, 4] standard normal, of the actions in s and in s'; drawn here if not given.
         """
         minibatch = observation.shape[1]
         if noise is None:
-            shape = (2, self.agents, minibatch, self.action_size)
+            shape = (self.agents, 2, minibatch, self.action_size)
             noise = torch.randn(shape, generator=self._generator, **self._like)
         if minibatch not in self._programs:
             on_cuda = self.device.type == "cuda"
@@ -148,11 +148,14 @@ class FusedSac:
     def _gradient_step(
         self, observation: Tensor, action: Tensor, reward: Tensor, next_observation: Tensor, noise: Tensor
     ) -> None:
-        sample = self._sample_actions("actor", observation, noise[0])
+        sample, next_sample = self._sample_actions(observation, next_observation, noise)
         temperature = self.log_temperature.exp()
         entropy = -sample.log_prob.mean(1)
         self._step_temperature(entropy)
-        critic_loss = self._step_critics(observation, action, reward, next_observation, noise[1], temperature)
+        next_q = self._q_values(self.target_critics, next_observation, next_sample.action).amin(0)
+        soft_value = next_q.sub_(temperature[:, None] * next_sample.log_prob)
+        target = torch.add(reward, soft_value, alpha=self.settings.discount)
+        critic_loss = self._step_critics(observation, action, target)
         actor_loss = self._step_actor(observation, sample, temperature)
         self.target_critics.parameters.lerp_(self.critics.parameters, self.settings.polyak)
         self._metric_sums.add_(torch.stack((actor_loss, critic_loss, temperature, entropy)))
@@ -163,21 +166,8 @@ class FusedSac:
             torch.sub(entropy, self._target_entropy, out=self._log_temperature_gradient)
             self._optimisers["temperature"].step()
 
-    def _step_critics(
-        self,
-        observation: Tensor,
-        action: Tensor,
-        reward: Tensor,
-        next_observation: Tensor,
-        noise: Tensor,
-        temperature: Tensor,
-    ) -> Tensor:
+    def _step_critics(self, observation: Tensor, action: Tensor, target: Tensor) -> Tensor:
         """Loss 1/2 sum_i mean (Q_i(s, a) - y)^2 with y = r + gamma (min_i Q'_i(s', a') - alpha log pi(a'|s'))."""
-        next_sample = self._sample_actions("next", next_observation, noise)
-        next_q = self._q_values(self.target_critics, next_observation, next_sample.action).amin(0)
-        soft_value = next_q.sub_(temperature[:, None] * next_sample.log_prob)
-        target = torch.add(reward, soft_value, alpha=self.settings.discount)
-
         error = self._q_values(self.critics, observation, action) - target
         minibatch = error.shape[-1]
         self.critics.backward((error / minibatch).view(-1, minibatch, 1), self._workspace("critics", minibatch))
@@ -200,13 +190,19 @@ class FusedSac:
             action_gradient.view(2, self.agents, minibatch, -1).sum(0),
             (temperature / minibatch)[:, None, None],
         )
-        self.actor.backward(head_gradient, self._workspace("actor", minibatch))
+        self.actor.backward(head_gradient, self._workspace("actor in s", minibatch))
         self._optimisers["actor"].step()
         return (temperature[:, None] * sample.log_prob).sub_(q_values.amin(0)).mean(1)
 
-    def _sample_actions(self, role: str, observation: Tensor, noise: Tensor) -> SquashedSample:
-        head = self.actor.forward(observation, self._workspace(role, observation.shape[1]))
-        return squashed_sample(head, noise, *self._log_std_bounds)
+    def _sample_actions(
+        self, observation: Tensor, next_observation: Tensor, noise: Tensor
+    ) -> tuple[SquashedSample, SquashedSample]:
+        """Actions in s and in s', by one pass through the actor."""
+        both = torch.cat((observation, next_observation), dim=1)
+        head = self.actor.forward(both, self._workspace("actor", both.shape[1]))
+        sample = squashed_sample(head, noise.flatten(1, 2), *self._log_std_bounds)
+        now, following = zip(*(tensor.chunk(2, dim=1) for tensor in sample), strict=True)
+        return SquashedSample(*now), SquashedSample(*following)
 
     def _q_values(self, critics: NetworkStack, observation: Tensor, action: Tensor) -> Tensor:
         """Q values [2, A, B] of both critics of every agent."""
@@ -217,10 +213,13 @@ class FusedSac:
         return critics.forward(workspace.activations[0], workspace).view(2, self.agents, -1)
 
     def _workspace(self, role: str, minibatch: int) -> Workspace:
-        """The memory of a pass: of the actor in s or in s', of any critics, or of the actor acting."""
+        """The memory of a pass of so many rows: of the critics, of the actor learning, its first half, or acting."""
         if (role, minibatch) not in self._workspaces:
-            stack = self.critics if role == "critics" else self.actor
-            self._workspaces[role, minibatch] = stack.workspace(minibatch)
+            if role == "actor in s":
+                made = self._workspace("actor", 2 * minibatch).first_rows(minibatch)
+            else:
+                made = (self.critics if role == "critics" else self.actor).workspace(minibatch)
+            self._workspaces[role, minibatch] = made
         return self._workspaces[role, minibatch]
 
     # --- reading and restoring --------------------------------------------------------------------------------
