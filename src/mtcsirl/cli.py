@@ -13,7 +13,7 @@ from types import FrameType
 from typing import NoReturn
 
 from mtcsirl import __version__
-from mtcsirl.commands import artefacts, export, stages, study, video
+from mtcsirl.commands import artefacts, export, stages, study, validate, video
 from mtcsirl.errors import UserError
 
 THREADS = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS")
@@ -36,7 +36,7 @@ def parser() -> Parser:
     )
     root.add_argument("--version", action="version", version=__version__)
     verbs = root.add_subparsers(metavar="VERB", required=True)
-    for group in (stages, artefacts, study, video, export):
+    for group in (stages, artefacts, study, video, export, validate):
         group.register(verbs)
     return root
 
