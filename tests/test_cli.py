@@ -260,3 +260,25 @@ def test_a_stopped_job_leaves_no_half_written_file(tmp_path: Path, number: int, 
     assert "Traceback" not in error
     assert not [path for path in run.iterdir() if path.name.endswith(".tmp") or path.name in OUTPUTS["train_sac"]]
     assert not storage.is_locked(run)
+
+
+def test_a_killed_job_goes_on_and_ends_with_the_same_bytes(tmp_path: Path) -> None:
+    changes = {"steps": 1500, "sac.minibatch": 32, "sac.updates_per_step": 0.1, "progress.checkpoint_every": 500}
+    changes |= {"sac.hidden_sizes": [16, 16], "evaluation.episodes": 1, "evaluation.episode_steps": 100}
+    sets = [word for key, value in changes.items() for word in ("--set", f"{key}={value}")]
+
+    def command(folder: str) -> list[str]:
+        return [sys.executable, "-m", "mtcsirl.cli", "train-sac", *KEY, *sets, "--output", str(tmp_path / folder)]
+
+    with subprocess.Popen(command("killed"), stderr=subprocess.DEVNULL) as job:
+        while not list(tmp_path.glob("killed/checkpoint*")):
+            assert job.poll() is None
+            time.sleep(0.005)
+        job.kill()
+    assert not (tmp_path / "killed/policy.safetensors").exists(), "it was killed before its end"
+    for folder in ("killed", "whole"):
+        subprocess.run(command(folder), check=True, capture_output=True)
+    for name in OUTPUTS["train_sac"]:
+        if name != "provenance.json":
+            assert (tmp_path / "killed" / name).read_bytes() == (tmp_path / "whole" / name).read_bytes(), name
+    assert not list(tmp_path.glob("killed/checkpoint*"))
