@@ -20,10 +20,10 @@ def small_sac() -> SacSettings:
 @pytest.fixture
 def small_run() -> AgentRunSettings:
     return AgentRunSettings(
-        steps=600,
+        steps=300,
         cs_weight=2.0,
         curriculum=True,
-        sac={"hidden_sizes": (16, 16), "minibatch": 32, "random_steps": 150, "updates_per_step": 0.2},
-        evaluation={"episodes": 2, "episode_steps": 100},
-        progress={"checkpoint_every": 200, "select_every": 200, "select_episodes": 1},
+        sac={"hidden_sizes": (16, 16), "minibatch": 32, "random_steps": 100, "updates_per_step": 0.2},
+        evaluation={"episodes": 2, "episode_steps": 50},
+        progress={"checkpoint_every": 100, "select_every": 100, "select_episodes": 1},
     )

@@ -58,7 +58,7 @@ def test_killed_run_resumes_to_the_same_bytes(small_run, tmp_path, learner, agen
     original = killed.environments.step
 
     def step(action):
-        if killed.step == 450:
+        if killed.step == 225:
             raise KilledError
         return original(action)
 
@@ -70,7 +70,7 @@ def test_killed_run_resumes_to_the_same_bytes(small_run, tmp_path, learner, agen
 
     lines = []
     agents_trained = train_agents(jobs, checkpoint=checkpoint, log=lines.append)
-    assert lines[0] == "resumed at step 400"
+    assert lines[0] == "resumed at step 200"
     for index, agent in enumerate(agents_trained):
         agent.save(tmp_path / "resumed" / str(index))
     resumed = {key: (tmp_path / "resumed" / key).read_bytes() for key in uninterrupted}
@@ -114,7 +114,7 @@ def test_rows(small_run):
     curve = agent.curve
     assert list(curve.columns) == ["step", "metric", "value"]
     episodes = curve[curve.metric == "success"]
-    assert episodes.step.tolist() == [100, 200, 300, 400, 500, 600]
+    assert episodes.step.tolist() == [50, 100, 150, 200, 250, 300]
     assert {"velocity", "action_norm", "task_reward", "temperature", "critic_loss"} <= set(curve.metric)
     evaluation = pd.DataFrame(agent.evaluation)
     assert list(evaluation.columns) == [
@@ -128,7 +128,7 @@ def test_rows(small_run):
         "value",
     ]
     assert len(evaluation) == 2 * 2 * 4
-    assert lines[-1].startswith("step 600/600")
+    assert lines[-1].startswith("step 300/300")
     assert all(word in lines[-1] for word in ("steps/s", "left", "success", "|a|_1", "velocity", "temperature"))
 
 
@@ -145,9 +145,9 @@ def test_every_update_is_made_and_none_before_the_random_steps_end(small_run):
     training.run()
     training.close()
     made = dict(counts)
-    assert made[150] == 0
-    assert made[155] == 1
-    assert made[600] == 90
+    assert made[100] == 0
+    assert made[105] == 1
+    assert made[300] == 40
 
 
 def test_best_policy_of_the_trials_is_kept(small_run, monkeypatch):

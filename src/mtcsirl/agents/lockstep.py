@@ -7,11 +7,12 @@ from collections.abc import Sequence
 from contextlib import suppress
 from multiprocessing.connection import Connection
 from multiprocessing.shared_memory import SharedMemory
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
 from mtcsirl.environments import ACTION_SIZE, OBSERVATION_SIZE, make_environment
+from mtcsirl.evaluation import Row, evaluate
 from mtcsirl.settings import EnvironmentSettings
 
 TaskTarget = tuple[str, int]
@@ -34,6 +35,9 @@ class Environments(Protocol):
 
     def step(self, action: np.ndarray) -> Outcome:
         """Apply actions [A, 4]."""
+
+    def evaluate(self, arguments: Sequence[tuple[Any, ...]]) -> list[list[Row]]:
+        """Call `mtcsirl.evaluation.evaluate` with each environment's arguments; the episodes of all follow."""
 
     def close(self) -> None:
         """Free them."""
@@ -70,6 +74,11 @@ class LocalEnvironments:
             np.array([one["diverged"] for one in info]),
         )
 
+    def evaluate(self, arguments: Sequence[tuple[Any, ...]]) -> list[list[Row]]:
+        """The evaluation rows of each environment's policy."""
+        pairs = zip(self.environments, arguments, strict=True)
+        return [evaluate(*own, reuse=environment) for environment, own in pairs]
+
     def close(self) -> None:
         """Free them."""
         for environment in self.environments:
@@ -88,6 +97,7 @@ class WorkerEnvironments:
         self._columns = _columns(self._memory, len(tasks))
         context = multiprocessing.get_context("spawn")
         self._pipes: list[Connection] = []
+        self._rows: list[list[int]] = []
         for worker in range(workers):
             ours, theirs = context.Pipe()
             rows = list(range(worker, len(tasks), workers))
@@ -95,6 +105,7 @@ class WorkerEnvironments:
             context.Process(target=_serve, args=arguments, daemon=True).start()
             theirs.close()
             self._pipes.append(ours)
+            self._rows.append(rows)
         self._wait()
 
     def reset(self) -> np.ndarray:
@@ -108,6 +119,17 @@ class WorkerEnvironments:
         self._command(b"step")
         observation, reward, success, diverged, _ = self._columns
         return Outcome(observation.copy(), reward[:, 0].copy(), success[:, 0] > 0, diverged[:, 0] > 0)
+
+    def evaluate(self, arguments: Sequence[tuple[Any, ...]]) -> list[list[Row]]:
+        """The evaluation rows of each environment's policy."""
+        for pipe, rows in zip(self._pipes, self._rows, strict=True):
+            pipe.send_bytes(b"evaluate")
+            pipe.send([arguments[row] for row in rows])
+        self._wait()
+        found: dict[int, list[Row]] = {}
+        for pipe, rows in zip(self._pipes, self._rows, strict=True):
+            found |= dict(zip(rows, pipe.recv(), strict=True))
+        return [found[row] for row in range(len(arguments))]
 
     def close(self) -> None:
         """End the workers and free the table."""
@@ -149,14 +171,19 @@ def _serve(
         environments = LocalEnvironments([tasks[row] for row in rows], settings)
         pipe.send_bytes(b"done")
         while (word := pipe.recv_bytes()) != b"close":
+            answer = None
             if word == b"reset":
                 columns[0][rows] = environments.reset()
+            elif word == b"evaluate":
+                answer = environments.evaluate(pipe.recv())
             else:
                 outcome = environments.step(columns[4][rows])
                 columns[0][rows] = outcome.next_observation
                 for column, values in zip(columns[1:4], outcome[1:], strict=True):
                     column[rows, 0] = values
             pipe.send_bytes(b"done")
+            if answer is not None:
+                pipe.send(answer)
     except EOFError:
         pass
     except Exception as error:

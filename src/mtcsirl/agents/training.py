@@ -7,9 +7,7 @@ policy, save. A run that is killed resumes from its last checkpoint and ends wit
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
-from multiprocessing import get_context
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -27,7 +25,7 @@ from mtcsirl.agents.relabelling import PolicyReward
 from mtcsirl.agents.replay import Replay
 from mtcsirl.agents.sac import FusedSac
 from mtcsirl.environments import ACTION_SIZE, OBSERVATION_SIZE
-from mtcsirl.evaluation import Row, evaluate, gate_verdict, measure_episode, stochastic_means
+from mtcsirl.evaluation import gate_verdict, measure_episode, stochastic_means
 from mtcsirl.settings import SacSettings
 
 if TYPE_CHECKING:
@@ -82,7 +80,6 @@ class Training:
         self._best: list[tuple[tuple[float, float], Policy] | None] = [None] * len(jobs)
         self._curves: list[list[tuple[int, str, float]]] = [[] for _ in jobs]
         self._checkpoint = None if checkpoint is None else Path(checkpoint)
-        self._workers = workers
         tasks = [(job.task, job.target) for job in jobs]
         self.environments: Environments = make_environments(tasks, self.settings.environment, workers)
         self._progress = Progress(self.settings.steps, log, events)
@@ -107,7 +104,8 @@ class Training:
     def finish(self) -> list[TrainedAgent]:
         """Evaluate what was kept and judge it by the gates."""
         policies = [self._kept(agent) for agent in range(len(self.jobs))]
-        evaluations = self._evaluate(policies)
+        keys = [(job.task, job.target, job.cs_reward, job.seed, job.settings) for job in self.jobs]
+        evaluations = self.environments.evaluate([(p, *key) for p, key in zip(policies, keys, strict=True)])
         trained = []
         for job, policy, rows, curve in zip(self.jobs, policies, evaluations, self._curves, strict=True):
             gate = gate_verdict(job.gate, stochastic_means(rows), job.cs_reward, self.settings.gates)
@@ -206,14 +204,6 @@ class Training:
     def _kept(self, agent: int) -> Policy:
         best = self._best[agent]
         return self._policy(agent) if best is None or self.jobs[agent].keep == "last" else best[1]
-
-    def _evaluate(self, policies: list[Policy]) -> list[list[Row]]:
-        keys = [(job.task, job.target, job.cs_reward, job.seed, job.settings) for job in self.jobs]
-        arguments = [(policy, *key) for policy, key in zip(policies, keys, strict=True)]
-        if self._workers == 0:
-            return [evaluate(*one) for one in arguments]
-        with ProcessPoolExecutor(self._workers, get_context("spawn")) as pool:
-            return list(pool.map(evaluate, *zip(*arguments, strict=True)))
 
     def _save(self, file: Path) -> None:
         """Write everything that the rest of the run depends on; the environments start afresh at every episode."""
