@@ -243,4 +243,6 @@ def _curve(trainer: IrlTrainer) -> pd.DataFrame:
 
 def shrunk() -> ValidationSettings:
     """The study at the size of a test."""
-    return replace(ValidationSettings(), seeds=(100,), iterations=12, warm_up_iterations=5, agent_steps=1_500)
+    return replace(
+        ValidationSettings(), seeds=(100,), iterations=7, warm_up_iterations=4, agent_steps=1_500, correlated=2_000
+    )
