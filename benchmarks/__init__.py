@@ -1,0 +1,1 @@
+"""Measured ratios against the peers; `make bench` runs all of them."""
