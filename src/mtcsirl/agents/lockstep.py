@@ -36,14 +36,18 @@ class Environments(Protocol):
     def step(self, action: np.ndarray) -> Outcome:
         """Apply actions [A, 4]."""
 
-    def evaluate(self, arguments: Sequence[tuple[Any, ...]]) -> list[list[Row]]:
-        """Call `mtcsirl.evaluation.evaluate` with each environment's arguments; the episodes of all follow."""
-
     def close(self) -> None:
         """Free them."""
 
 
-def make_environments(tasks: Sequence[TaskTarget], settings: EnvironmentSettings, workers: int = 0) -> Environments:
+class TaskEnvironments(Environments, Protocol):
+    """Environments of Meta-World tasks, which can also be evaluated in."""
+
+    def evaluate(self, arguments: Sequence[tuple[Any, ...]]) -> list[list[Row]]:
+        """Call `mtcsirl.evaluation.evaluate` with each environment's arguments; the episodes of all follow."""
+
+
+def make_environments(tasks: Sequence[TaskTarget], settings: EnvironmentSettings, workers: int = 0) -> TaskEnvironments:
     """Environments of these (task, target) pairs, in this process or in `workers` others (spawned)."""
     if workers > 0:
         return WorkerEnvironments(tasks, settings, min(workers, len(tasks)))

@@ -18,7 +18,7 @@ import torch
 from mtcsirl import storage
 from mtcsirl.agents.checkpoint import load_checkpoint, prefixed, save_checkpoint, without_prefix
 from mtcsirl.agents.jobs import AgentJob, TrainedAgent, gate_score, shared_settings
-from mtcsirl.agents.lockstep import Environments, make_environments
+from mtcsirl.agents.lockstep import TaskEnvironments, make_environments
 from mtcsirl.agents.policy import Policy
 from mtcsirl.agents.progress import Progress
 from mtcsirl.agents.relabelling import PolicyReward
@@ -81,7 +81,7 @@ class Training:
         self._curves: list[list[tuple[int, str, float]]] = [[] for _ in jobs]
         self._checkpoint = None if checkpoint is None else Path(checkpoint)
         tasks = [(job.task, job.target) for job in jobs]
-        self.environments: Environments = make_environments(tasks, self.settings.environment, workers)
+        self.environments: TaskEnvironments = make_environments(tasks, self.settings.environment, workers)
         self._progress = Progress(self.settings.steps, log, events)
         self._log = log
 
