@@ -1,5 +1,6 @@
 """The criteria of ``claims.yaml``, one function per kind: evidence in, judged units out."""
 
+import math
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 
@@ -70,7 +71,7 @@ def equivalent_to_sac(evidence: Evidence, rules: Rules) -> Iterator[Unit]:
             ours, base = group.metric, sac.metric
             # Only the experts behind the demonstrations need to be there; without any, the target stands in.
             goal = expert.metric.mean if expert.metric.n else group.target
-            gap = goal - base.mean
+            gap = (goal - base.mean) or math.nan  # without a gap nothing can be said in parts of it
             test = welch(ours, base)
             margin = rules["margin"] * abs(gap)
             if equivalent(ours, base, margin):
@@ -182,7 +183,7 @@ def better_than(evidence: Evidence, rules: Rules) -> Iterator[Unit]:
                 advantage(nearer, needed, "closer to the target"),
                 advantage(oftener, rules["success_advantage"], "more often successful"),
             ]
-            gap = sac.distance.mean
+            gap = sac.distance.mean or math.nan
             value = Estimate(nearer.difference / gap, nearer.low / gap, nearer.high / gap, theirs.distance.n)
             printed = paper.unseen(other, cs, cs)
             unit = judged_unit(cs, other, theirs, parts, "distance lost to MT-CSIRL / SAC's gap", value, printed)
