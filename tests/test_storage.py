@@ -149,7 +149,7 @@ def test_empty_cs_reward_stays_text(tmp_path: Path) -> None:
 def _hold(folder: Path, holds: Any, done: Any) -> None:
     with storage.locked(folder):
         holds.set()
-        done.wait(30)
+        done.wait(300)
 
 
 def test_a_folder_has_one_writer(tmp_path: Path) -> None:
@@ -158,7 +158,7 @@ def test_a_folder_has_one_writer(tmp_path: Path) -> None:
     other = context.Process(target=_hold, args=(tmp_path / "run", holds, done))
     other.start()
     try:
-        assert holds.wait(30)
+        assert holds.wait(300)
         assert storage.is_locked(tmp_path / "run")
         with pytest.raises(UserError, match="another process writes here"), storage.locked(tmp_path / "run"):
             pass
