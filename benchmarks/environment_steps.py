@@ -23,19 +23,8 @@ import numpy as np
 
 from mtcsirl.environments import EPISODE_STEPS, make_environment
 from mtcsirl.fast_metaworld.identity import first_difference, stock_environment
+from mtcsirl.settings.study import DESIGN_TASKS
 
-DESIGN_TASKS = (
-    "reach-wall",
-    "button-press-topdown-wall",
-    "drawer-close",
-    "push-back",
-    "coffee-button",
-    "window-open",
-    "reach",
-    "plate-slide",
-    "faucet-open",
-    "door-close",
-)
 TURN_STEPS = 100
 
 

@@ -17,19 +17,8 @@ from mtcsirl.fast_metaworld.identity import first_difference, stock_environment,
 from mtcsirl.fast_metaworld.rotation import quaternion_of
 from mtcsirl.fast_metaworld.targets import target_vectors
 from mtcsirl.fast_metaworld.tolerance import tolerance
+from mtcsirl.settings.study import DESIGN_TASKS
 
-DESIGN_TASKS = (
-    "reach-wall",
-    "button-press-topdown-wall",
-    "drawer-close",
-    "push-back",
-    "coffee-button",
-    "window-open",
-    "reach",
-    "plate-slide",
-    "faucet-open",
-    "door-close",
-)
 MAPPED = OBSERVATION_MAPS["mapped"]
 
 

@@ -21,6 +21,8 @@ from mtcsirl.tasks import TARGETS_PER_TASK, TASKS
 
 SINGLE_TASKS = ("reach-wall", "button-press-topdown-wall", "drawer-close", "push-back", "coffee-button")
 TRAIN_TASKS = ("window-open", "reach", "plate-slide", "faucet-open", "coffee-button", "door-close")
+DESIGN_TASKS = tuple(dict.fromkeys(SINGLE_TASKS + TRAIN_TASKS))
+"""The ten tasks of the paper."""
 UNSEEN_TASKS = ("reach-wall", "button-press-topdown-wall", "drawer-close", "push-back")
 METHODS = ("mt_airl", "mt_vairl", "mt_vairl_gp", "mt_csirl", "mt_csirl_lt")
 CS_REWARDS = ("velocity", "action_norm")
