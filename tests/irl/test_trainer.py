@@ -1,5 +1,6 @@
 """Algorithms 1 and 2 at toy size."""
 
+import copy
 import json
 
 import numpy as np
@@ -113,7 +114,7 @@ def test_methods_without_the_task_reward_never_see_it(method, demonstrations) ->
     other = sample._replace(task_reward=sample.task_reward + 5.0)
     assert torch.equal(trainer.policy_reward(sample), trainer.policy_reward(other))
     assert trainer.alpha().tolist() == [1.0, 1.0]
-    batch = trainer._batch(16)
+    (batch,) = trainer._batches(1, 16)
     changed = batch._replace(generator=batch.generator._replace(task_reward=batch.generator.task_reward + 5.0))
     for discriminator in trainer.method.discriminators.values():
         assert torch.equal(discriminator.logits(batch)[1], discriminator.logits(changed)[1])
@@ -163,25 +164,49 @@ def test_as_printed_pays_each_generator_by_f_after_its_own_turn(demonstrations) 
     assert not torch.allclose(paying[0], final[0])
 
 
-def test_log_pi_is_clamped_and_of_the_current_policy(demonstrations) -> None:
-    trainer = _run(_trainer("mt_csirl", demonstrations), 1)
-    batch = trainer._batch(64)
-    expected = trainer.sac.log_prob(batch.generator.observation, batch.generator.action).clamp(-10, 10)
-    torch.testing.assert_close(batch.generator_log_pi, expected)
-    assert batch.expert_log_pi.abs().max() <= 10
+def test_log_pi_is_clamped_and_as_printed_of_the_current_policy(demonstrations) -> None:
+    trainer = _run(_trainer("mt_csirl", demonstrations, logit_density="as_printed"), 2)
+    trainer._tabulate(random=False)
+    (batch,) = trainer._batches(1, 64)
+    for side, log_pi in ((batch.generator, batch.generator_log_pi), (batch.expert, batch.expert_log_pi)):
+        expected = trainer.sac.log_prob(side.observation, side.action).clamp(-10, 10)
+        torch.testing.assert_close(log_pi, expected, rtol=1e-4, atol=1e-4)
+
+
+def test_log_pi_of_replayed_samples_is_that_of_the_mixture_that_made_them(demonstrations) -> None:
+    trainer = _trainer("mt_csirl", demonstrations, generator_replay=2, iterations=4)
+    policies = []
+    for _ in range(4):
+        policies.append(copy.deepcopy(trainer.sac))
+        trainer.iterate()
+    (batch,) = trainer._batches(1, 64)
+    for side, log_pi in ((batch.generator, batch.generator_log_pi), (batch.expert, batch.expert_log_pi)):
+        both = [sac.log_prob(side.observation, side.action).exp() for sac in policies[-2:]]
+        expected = (sum(both) / 2).log().clamp(-10, 10)
+        torch.testing.assert_close(log_pi, expected, rtol=1e-3, atol=1e-3)
+    only_latest = policies[-1].log_prob(batch.generator.observation, batch.generator.action).clamp(-10, 10)
+    assert not torch.allclose(batch.generator_log_pi, only_latest, atol=1e-2)
+
+
+def test_both_densities_agree_on_the_latest_rollout_alone(demonstrations) -> None:
+    first, second = (
+        _run(_trainer("mt_csirl", demonstrations, generator_replay=1, logit_density=density))
+        for density in ("as_printed", "mixture")
+    )
+    assert _same(first, second)
 
 
 def test_generator_side_comes_from_the_last_iterations_only(demonstrations) -> None:
     trainer = _run(_trainer("mt_csirl", demonstrations, generator_replay=1), 2)
     latest = {tuple(row) for row in trainer.replay.latest(60).observation[0].tolist()}
-    sampled = {tuple(row) for row in trainer._batch(200).generator.observation[0].tolist()}
+    sampled = {tuple(row) for row in trainer._batches(1, 200)[0].generator.observation[0].tolist()}
     assert sampled <= latest
 
 
 def test_temperature_in_the_logit_is_a_choice(demonstrations) -> None:
     for choice, expected in (("generator", 0.25), ("as_printed", 1.0)):
         trainer = _run(_trainer("mt_csirl", demonstrations, logit_temperature=choice, temperature=0.25), 1)
-        assert trainer._batch(4).temperature.tolist() == [[pytest.approx(expected)]] * 2
+        assert trainer._batches(1, 4)[0].temperature.tolist() == [[pytest.approx(expected)]] * 2
 
 
 def test_same_seed_same_bytes_and_resume_ends_with_them(demonstrations, tmp_path, monkeypatch) -> None:

@@ -10,6 +10,7 @@ from mtcsirl.agents.lockstep import Outcome
 from mtcsirl.agents.replay import Replay
 from mtcsirl.agents.training import make_learner
 from mtcsirl.irl.curriculum import Curriculum
+from mtcsirl.irl.densities import Densities
 from mtcsirl.irl.diagnostics import (
     Row,
     discriminator_measures,
@@ -57,6 +58,9 @@ class IrlTrainer:
         capacity = min(self.irl.generator_memory, self.iterations * steps)
         self.replay = Replay(tasks, capacity, seed=replayed, observation_size=state, action_size=action)
         self.curriculum = Curriculum(tasks, self.irl.curriculum_window)
+        mixed = self.irl.generator_replay if self.irl.logit_density == "mixture" else 1
+        self._densities = Densities(demonstrations, settings.sac, policies=mixed, steps=steps)
+        self._policies_mixed = mixed
         self._random = torch.Generator().manual_seed(own)
         self._paying: dict[str, RewardNetwork] = {}
         self._centres: dict[str, Tensor] = {}
@@ -76,7 +80,10 @@ class IrlTrainer:
     def iterate(self) -> None:
         """One outer iteration of Algorithm 1 or 2."""
         steps, episode = self.irl.steps_per_iteration, self.settings.evaluation.episode_steps
+        random = self._acts_randomly
         success = collect(self.world.environments, self._act, steps, episode, self._on_step)
+        if not self._warming_up or self.iteration + self._policies_mixed > self.irl.warm_up_iterations:
+            self._tabulate(random)
         if not self._warming_up:
             self._note_discriminators(self._update_discriminators())
         for _ in range(self.irl.generator_updates):
@@ -87,8 +94,12 @@ class IrlTrainer:
 
     # --- generators ---------------------------------------------------------------------------------------------
 
+    @property
+    def _acts_randomly(self) -> bool:
+        return self.replay.size < min(self.settings.sac.random_steps, self.replay.capacity)
+
     def _act(self, observation: np.ndarray) -> np.ndarray:
-        if self.replay.size < min(self.settings.sac.random_steps, self.replay.capacity):
+        if self._acts_randomly:
             shape = (len(observation), self._demonstrations.action.shape[-1])
             return (2.0 * torch.rand(shape, generator=self._random) - 1.0).numpy()
         return self.sac.act(torch.from_numpy(observation).float()).numpy()
@@ -126,7 +137,7 @@ class IrlTrainer:
 
     def _update_discriminators(self) -> dict[str, float]:
         """D_updates per task; returns the mean norm of each discriminator's gradients."""
-        batches = [self._batch(self.irl.discriminator.minibatch) for _ in range(self.irl.discriminator_updates)]
+        batches = self._batches(self.irl.discriminator_updates, self.irl.discriminator.minibatch)
         as_printed = self.irl.schedule == "as_printed"
         norms = {}
         for name, discriminator in self.method.discriminators.items():
@@ -151,22 +162,35 @@ class IrlTrainer:
         paying = RewardNetwork.from_parameters(discriminator.network.architecture, torch.cat(after_turn))
         return paying, float(torch.stack(norms).mean())
 
-    def _batch(self, minibatch: int) -> Batch:
-        """Expert and generator transitions [T, minibatch] with log pi under the current policies."""
-        tasks, held = self._demonstrations.task_reward.shape
-        index = torch.randint(held, (tasks, minibatch), generator=self._random)
-        expert = self._scaled(gather(self._demonstrations, index))
-        window = self.irl.generator_replay * self.irl.steps_per_iteration
-        generator = self._scaled(self.replay.sample(minibatch, recent=window))
-        log_pi = self.sac.log_prob(
-            torch.cat((expert.observation, generator.observation), dim=1),
-            torch.cat((expert.action, generator.action), dim=1),
-        )
-        log_pi = clamp_log_pi(log_pi, self.irl.discriminator.log_pi_clamp)
+    def _window(self) -> Transitions:
+        """The generators' transitions [T, n] that discriminators see: whole rollouts, the newest one last."""
+        wanted = self.irl.generator_replay * self.irl.steps_per_iteration
+        return self.replay.latest(min(wanted, self.replay.size))
+
+    def _tabulate(self, random: bool) -> None:
+        """Note the policies that made the newest rollout; ``random``: it began with uniform actions."""
+        uniform = random and self.irl.logit_density == "mixture"
+        actors = None if uniform else [self.sac.policy(agent) for agent in range(len(self.world.members))]
+        self._densities.add(actors, self._window())
+
+    def _batches(self, count: int, minibatch: int) -> list[Batch]:
+        """``count`` minibatches of expert and generator transitions [T, minibatch] with their log pi."""
         temperature = self.sac.temperature.unsqueeze(1)
         if self.irl.logit_temperature == "as_printed":
             temperature = torch.ones_like(temperature)
-        return Batch(expert, generator, log_pi[:, :minibatch], log_pi[:, minibatch:], temperature)
+        sides = []
+        for held, log_pi in (
+            (self._demonstrations, self._densities.expert()),
+            (self._window(), self._densities.generator()),
+        ):
+            log_pi = clamp_log_pi(log_pi, self.irl.discriminator.log_pi_clamp)
+            shape = count, len(log_pi), minibatch
+            index = torch.randint(log_pi.shape[1], shape, generator=self._random)
+            sides.append([(self._scaled(gather(held, one)), log_pi.gather(1, one)) for one in index])
+        return [
+            Batch(expert, generator, expert_log_pi, generator_log_pi, temperature)
+            for (expert, expert_log_pi), (generator, generator_log_pi) in zip(*sides, strict=True)
+        ]
 
     def _scaled(self, transitions: Transitions) -> Transitions:
         return transitions._replace(task_reward=self.irl.task_reward_scale * transitions.task_reward)
@@ -180,7 +204,7 @@ class IrlTrainer:
 
     def _note_discriminators(self, norms: Mapping[str, float]) -> None:
         """Rows on the discriminators, between their updates and the generators'."""
-        members, batch = self.world.members, self._batch(DIAGNOSED)
+        members, (batch,) = self.world.members, self._batches(1, DIAGNOSED)
         for metric, values in log_pi_measures(batch).items():
             self.diagnostics += rows_per_task(members, self._steps_after, metric, values, discriminator="")
         for name, discriminator in self.method.discriminators.items():
@@ -206,6 +230,7 @@ class IrlTrainer:
             "sac": self.sac.state_dict(),
             "replay": self.replay.state_dict(),
             "curriculum": self.curriculum.state(),
+            "densities": self._densities.state(),
             "trainer": {"random": self._random.get_state(), "iteration": torch.tensor(self.iteration)},
         }
         parts |= {f"discriminator_{name}": one.state() for name, one in self.method.discriminators.items()}
@@ -218,6 +243,7 @@ class IrlTrainer:
         self.replay.load_state_dict(part["replay"])
         for name, tensor in self.curriculum.state().items():
             tensor.copy_(part["curriculum"][name])
+        self._densities.load_state(part.get("densities", {}))
         self._random.set_state(part["trainer"]["random"])
         self.iteration = int(part["trainer"]["iteration"])
         for name, discriminator in self.method.discriminators.items():

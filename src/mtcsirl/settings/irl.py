@@ -78,6 +78,12 @@ class IrlSettings(Frozen):
         " but for MT-CSIRL+LT, whose two rewards take tau / 2 each",
         paper="as_printed",
     )
+    logit_density: Literal["as_printed", "mixture"] = key(
+        "mixture",
+        "log pi in the logit: of the current policy as printed, or of the mixture of the policies that made the"
+        " generator's samples; they agree for generator_replay 1",
+        paper="as_printed",
+    )
     task_reward_scale: float = key(1.0, "factor on r_task in logit and policy reward", paper=1.0, gt=0)
     cs_weight: float = key(1.0, "alpha: factor on f in the policy reward beside the curriculum", paper=1.0, gt=0)
     centre: bool = key(
