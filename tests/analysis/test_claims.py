@@ -8,6 +8,7 @@ from mtcsirl.analysis.evidence import Group
 from mtcsirl.analysis.judging import MET, NOT_MET, closing
 from mtcsirl.analysis.rows import select
 from mtcsirl.analysis.statistics import Summary
+from mtcsirl.analysis.unit_text import COLUMNS, unit_texts
 from mtcsirl.settings import Settings
 from tests.analysis.made_up_claims import (
     CORRELATIONS,
@@ -270,10 +271,52 @@ def test_json_and_markdown_show_all_that_was_judged(findings):
     unit = next(c for c in data["claims"] if c["name"] == "C7")["units"][0]
     assert unit["published"]["prediction_interval"]["low"] == pytest.approx(2.434, abs=1e-3)
     assert unit["hedges_g"]["low"] < unit["hedges_g"]["value"] < unit["hedges_g"]["high"]
-    assert {"unit", "paper", "ours", "answer"} <= set(unit)
+    assert list(unit["texts"]) == list(COLUMNS)
+    assert unit["measure"]["published"] == pytest.approx(1 - 0.25 / 1.43, abs=1e-6)
     text = claims_markdown(findings, SETTINGS)
     assert all(f"### {name}: reproduced" in text for name in CLAIMS)
-    assert "g = " in text
+    rows = [line for line in text.splitlines() if line.startswith("| action norm, unseen tasks")]
+    assert rows
+    assert {row.count(" | ") for row in rows} == {len(COLUMNS) - 1}
+
+
+def test_criteria_of_a_unit_stand_side_by_side(findings):
+    """MT-CSIRL, velocity: about 0.73 m/s, as in the paper; SAC moves at 0.32."""
+    unit = next(u for f in findings if f.name == "C7" for u in f.units if u.cs_reward == "velocity")
+    texts = unit_texts(unit)
+    assert texts["paper"] == "0.73±0.07"
+    assert texts["ours_in_prediction"] == "yes [0.61, 0.85]"
+    assert texts["measure"].startswith("part of SAC's gap closed: 0.8")
+    assert texts["measure"].endswith("; paper 0.85")
+    assert texts["difference"].startswith("SAC: yes, +0.4")
+    assert texts["difference"].endswith("p < 0.001")
+    assert texts["effect"].endswith("closer with probability 1.00")
+    nothing = unit_texts(finding("C7", change=lambda rows: missing(rows, stage="transfer")).units[0])
+    assert nothing["judged"] == "not run"
+    assert {nothing[name] for name in ("ours", "measure", "ours_in_prediction", "difference", "effect")} == {"–"}
+
+
+@pytest.mark.parametrize(
+    ("name", "cs_reward", "what", "expected"),
+    [
+        ("C1", "velocity", "reach-wall", 0.01 / 0.8),
+        ("C4", "velocity", "reach-wall", 0.18),
+        ("C5", "velocity", "reach-wall", 1 - 0.07 / 0.63),
+        ("C6", "velocity", "reach-wall", 1 - (1 - 0.37) / (1 - 0.26)),
+        ("C8", "velocity", "mt_airl", (0.69 - 0.07) / 0.48),
+        ("C10", "action_norm", "unseen tasks", 1 - 0.3 / 1.43),
+        ("C11", "velocity", "reach", 0.11),
+    ],
+)
+def test_the_papers_numbers_are_put_on_the_scale_of_the_criterion(findings, name, cs_reward, what, expected):
+    units = next(found.units for found in findings if found.name == name)
+    unit = next(unit for unit in units if (unit.cs_reward, unit.what) == (cs_reward, what))
+    assert unit.paper_value == pytest.approx(expected, abs=1e-9)
+
+
+def test_every_claim_with_agents_has_an_effect_size(findings):
+    without = {found.name for found in findings if not all(unit.effect.n for unit in found.units)}
+    assert without == {"C4", "C9"}, "there r itself is the effect size"
 
 
 def test_every_claim_states_its_criterion():

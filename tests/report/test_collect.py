@@ -96,7 +96,7 @@ def test_claims_are_the_judged_ones(results):
     assert [claim.name for claim in claims] == [f"C{number}" for number in range(1, 13)]
     assert {claim.verdict for claim in claims} == {"not run"}
     assert claims[0].locus == "Table 2, row Expert"
-    assert claims[0].units[0][0].endswith("reach-wall")
+    assert claims[0].units[0]["unit"].endswith("reach-wall")
     assert all(claim.criterion and claim.reason for claim in claims)
 
 
@@ -108,6 +108,16 @@ def test_gates_are_counted_by_agent_task_and_cs_reward(results):
     assert (generator.passed, generator.agents, generator.metric) == (1, 1, 0.8)
     transfers = gates["transfer agent, multi target, mt csirl", "reach-wall", "velocity"]
     assert transfers.agents == 5  # one per source task
+
+
+def test_targets_cost_what_their_runs_did(results):
+    settings, root = results
+    lines = {line.target: line for line in collect(settings, root / "page.html").targets}
+    assert list(lines) == [*ARTEFACTS, "claims", "report", "all"]
+    jobs = sum(design(settings, "table_2").jobs().values())
+    assert (lines["table_2"].done, lines["table_2"].planned) == (jobs, jobs)
+    assert lines["table_2"].cpu_seconds == pytest.approx(720 * jobs)
+    assert lines["table_5"].planned == 0
 
 
 def test_links_lead_to_files(results):
@@ -144,7 +154,7 @@ def test_nothing_there(tmp_path):
 
 
 def test_deviations_are_those_of_the_settings():
-    settings = Settings(results="nowhere", figures="nowhere")
+    settings = Settings(results="nowhere", figures="nowhere", sac={"minibatch": 128})
     data = collect(settings, Path("nowhere/index.html"), partial=True)
     minibatch = next(line for line in data.deviations if line.key == "sac.minibatch")
     assert (minibatch.ours, minibatch.paper) == ("128 transitions", "500")

@@ -7,6 +7,7 @@ from html.parser import HTMLParser
 
 import pytest
 
+from mtcsirl.analysis.unit_text import COLUMNS
 from mtcsirl.report.page import build_report
 from tests.report.browser import CHROMIUM, inspect
 from tests.report.made_up import FIGURES, made_up_report
@@ -82,6 +83,16 @@ def test_verdicts_are_counted_and_worded(page):
     for verdict in ("reproduced", "partially", "not reproduced", "inconclusive", "precondition not met", "not run"):
         assert f">{verdict}: 2</span>" in page
         assert page.count(f">{verdict}</span>") == 2
+
+
+def test_numbers_behind_a_claim_stand_side_by_side(page):
+    numbers = page.split('id="claim-C1"')[1].split("</table>")[0]
+    for text in (*COLUMNS.values(), "yes [0.77, 0.85]", "p &lt; 0.001", "12.1 [6.0, 18.2]"):
+        assert text.replace("'", "&#39;") in numbers
+
+
+def test_every_target_has_its_cost(page):
+    assert "<dd>makes table_2: 3 of 4 runs, 90 min</dd>" in page
 
 
 def test_paper_stands_below_ours(page):

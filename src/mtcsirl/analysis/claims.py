@@ -14,6 +14,7 @@ import yaml
 from mtcsirl.analysis.criteria import KINDS
 from mtcsirl.analysis.evidence import Evidence
 from mtcsirl.analysis.judging import BLOCKED, MET, NOT_MET, NOT_RUN, TOO_FEW, UNCLEAR, Unit
+from mtcsirl.analysis.unit_text import COLUMNS, unit_texts
 from mtcsirl.published import Published, load_published
 from mtcsirl.settings import Settings
 
@@ -106,15 +107,13 @@ def claims_json(findings: Sequence[Finding], settings: Settings) -> dict[str, An
 
 
 def _unit_json(unit: Unit) -> dict[str, Any]:
-    """Three texts for people, then every number."""
+    """The texts for people, then every number."""
     return {
-        "unit": unit_name(unit),
-        "paper": paper_text(unit),
-        "ours": ours_text(unit),
+        "texts": unit_texts(unit),
+        "cs_reward": unit.cs_reward,
         "answer": unit.state,
         "reason": unit.reason,
-        "cs_reward": unit.cs_reward,
-        "measure": {"name": unit.measure, **_plain(unit.value)},
+        "measure": {"name": unit.measure, **_plain(unit.value), "published": _number(unit.paper_value)},
         "metric": {**_plain(unit.ours), "t_interval": _plain(unit.interval)},
         "success": _plain(unit.success),
         "reference": {"name": unit.reference, **_plain(unit.reference_summary)},
@@ -135,48 +134,6 @@ def _number(value: float) -> float | int | None:
     return round(float(value), 6) if np.isfinite(value) else None
 
 
-def unit_name(unit: Unit) -> str:
-    """As in "velocity, reach-wall"."""
-    return f"{unit.cs_reward.replace('_', ' ')}, {unit.what}"
-
-
-def ours_text(unit: Unit) -> str:
-    """The metric over seeds and the measure of the criterion, in one line."""
-    if unit.value.n == 0 and unit.ours.n == 0:
-        return "–"
-    metric = f"{unit.ours.mean:.2f}{_plus_minus(unit.ours.std)} (n={unit.ours.n})"
-    if unit.measure.startswith("Pearson"):
-        return f"r = {unit.value.value:.2f}{_bounds(unit.value.low, unit.value.high)} (n={unit.value.n})"
-    success = "" if np.isnan(unit.success.mean) else f", success {100 * unit.success.mean:.0f} %"
-    measure = f"{unit.measure} {unit.value.value:.2f}{_bounds(unit.value.low, unit.value.high)}"
-    return f"{metric}{success}; {measure}{_effect(unit)}"
-
-
-def paper_text(unit: Unit) -> str:
-    """The paper's number and its prediction interval, where it prints them."""
-    if np.isnan(unit.paper.mean):
-        return "no number"
-    inside = {None: "", True: " (ours inside)", False: " (ours outside)"}[unit.inside]
-    interval = _bounds(unit.prediction.low, unit.prediction.high) + inside
-    return f"{unit.paper.mean:.2f}{_plus_minus(unit.paper.std)}{interval}"
-
-
-def _effect(unit: Unit) -> str:
-    if not unit.reference or np.isnan(unit.effect.value):
-        return ""
-    g = f"{unit.effect.value:.1f}" if np.isfinite(unit.effect.value) else "infinite"
-    closer = "" if np.isnan(unit.closer) else f", closer with probability {unit.closer:.2f}"
-    return f"; against {unit.reference}: g = {g}{_bounds(unit.effect.low, unit.effect.high, 1)}{closer}"
-
-
-def _plus_minus(std: float) -> str:
-    return "" if np.isnan(std) else f"±{std:.2f}"
-
-
-def _bounds(low: float, high: float, digits: int = 2) -> str:
-    return "" if np.isnan(low) else f" [{low:.{digits}f}, {high:.{digits}f}]"
-
-
 def claims_markdown(findings: Sequence[Finding], settings: Settings) -> str:
     """One table of verdicts, then one table of units per claim."""
     scale = "smoke scale: numbers mean nothing" if settings.scale == "smoke" else f"scale {settings.scale}"
@@ -191,8 +148,6 @@ def claims_markdown(findings: Sequence[Finding], settings: Settings) -> str:
         parts += ["", f"### {finding.name}: {finding.verdict}", "", f"{finding.text} ({finding.locus})", ""]
         parts += [f"Criterion: {finding.criterion.strip()}.", ""]
         if finding.units:
-            parts += ["| Unit | Paper | Ours | Judged | Why |", "| :-- | :-- | :-- | :-- | :-- |"]
-            parts += [
-                f"| {unit_name(u)} | {paper_text(u)} | {ours_text(u)} | {u.state} | {u.reason} |" for u in finding.units
-            ]
+            rows = [COLUMNS, {name: ":--" for name in COLUMNS}, *map(unit_texts, finding.units)]
+            parts += ["| " + " | ".join(row[name] for name in COLUMNS) + " |" for row in rows]
     return "\n".join(parts) + "\n"

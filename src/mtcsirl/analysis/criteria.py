@@ -9,6 +9,7 @@ import numpy as np
 from mtcsirl.analysis.evidence import Evidence, multi_target, multi_task, single_target
 from mtcsirl.analysis.judging import (
     BLOCKED,
+    CORRELATION,
     MET,
     NOT_MET,
     UNCLEAR,
@@ -21,6 +22,7 @@ from mtcsirl.analysis.judging import (
     checked,
     checked_runs,
     closed,
+    closed_in_paper,
     closing,
     judge_correlation,
     judged_unit,
@@ -40,6 +42,7 @@ def on_target(evidence: Evidence, rules: Rules) -> Iterator[Unit]:
     for cs in in_paper_order(settings.cs_rewards):
         target = paper.target(cs)
         for task in tasks_of(evidence, rules["units"]):
+            reference, name = evidence.sac(cs, [task]), "SAC"
             if rules["agent"] == "expert":
                 run, group, printed = None, evidence.experts(cs, [task]), paper.unseen("expert", cs, cs)
             elif rules["agent"] == "generator":
@@ -49,6 +52,7 @@ def on_target(evidence: Evidence, rules: Rules) -> Iterator[Unit]:
                 run = multi_task(settings, cs, "mt_csirl_lt")
                 group = evidence.transfers(run, [task], settings.multi_task.train_targets[0])
                 printed = scaled(paper.learned_task(task, cs, cs), target)
+                reference, name = evidence.generators(run, [task]), "IRL agent"
             limit = rules["distance"].get(cs, max(rules["distance"].values()))
             distance = scaled(group.distance, 1 / target)
             parts = [
@@ -56,8 +60,9 @@ def on_target(evidence: Evidence, rules: Rules) -> Iterator[Unit]:
                 at_least(group.success, rules["success"], "success"),
             ]
             value = Estimate(distance.mean, *t_interval(distance), distance.n)
-            unit = judged_unit(cs, task, group, parts, "distance to the target / target", value, printed)
-            yield checked(evidence, unit, rules, run, group)
+            theirs = abs(printed.mean / target - 1)
+            unit = judged_unit(cs, task, group, parts, "distance to the target / target", value, printed, theirs)
+            yield checked(evidence, against(unit, group, reference, name), rules, run, group)
 
 
 def equivalent_to_sac(evidence: Evidence, rules: Rules) -> Iterator[Unit]:
@@ -102,16 +107,18 @@ def correlation(evidence: Evidence, rules: Rules) -> Iterator[Unit]:
             statistic="pearson",
         )
         r = mean_correlation(chosen["value"])
+        printed = evidence.published.correlation(rules["experiment"], cs)
         unit = Unit(
             cs_reward=cs,
             what=run.source,
             state=judge_correlation(r, rules),
             reason=f"on {rules['transitions']} transitions",
-            measure="Pearson's r of learned and true reward",
+            measure=CORRELATION,
             value=r,
             ours=Summary(r.value, float(chosen["value"].std()), r.n),
             interval=Interval(r.low, r.high),
-            paper=evidence.published.correlation(rules["experiment"], cs),
+            paper=printed,
+            paper_value=printed.mean,
         )
         yield checked_runs(evidence, unit, rules, run, r.n)
 
@@ -122,20 +129,24 @@ def closes_gap(evidence: Evidence, rules: Rules) -> Iterator[Unit]:
     for cs in in_paper_order(settings.cs_rewards):
         if rules["units"] == "unseen":
             run, tasks = multi_task(settings, cs, rules["method"]), settings.multi_task.unseen_tasks
-            cases = [(run, tasks, "unseen tasks", paper.unseen(rules["method"], cs, cs))]
+            cases = [
+                (run, tasks, "unseen tasks", paper.unseen(rules["method"], cs, cs), paper.unseen("sac", cs, cs).mean)
+            ]
         else:
+            target = paper.target(cs)
             cases = [
                 (multi_target(settings, cs, task), (task,), task,
-                 scaled(paper.cross_transfer(cs, task, task), paper.target(cs)))
+                 scaled(paper.cross_transfer(cs, task, task), target), target * paper.cross_baseline(cs, task).mean)
                 for task in settings.multi_target.tasks
             ]  # fmt: skip
-        for run, tasks, what, printed in cases:
+        for run, tasks, what, printed, printed_sac in cases:
             group, sac = evidence.transfers(run, tasks), evidence.sac(cs, tasks)
             parts = [
                 closing(group.distance, sac.distance, rules["at_least"]),
                 at_least(group.success, rules["success"], "success"),
             ]
-            unit = judged_unit(cs, what, group, parts, "part of SAC's gap closed", closed(group, sac), printed)
+            theirs = closed_in_paper(printed.mean, printed_sac, paper.target(cs))
+            unit = judged_unit(cs, what, group, parts, "part of SAC's gap closed", closed(group, sac), printed, theirs)
             yield checked(evidence, against(unit, group, sac, "SAC"), rules, run, group, sac)
 
 
@@ -156,11 +167,11 @@ def stays_behind(evidence: Evidence, rules: Rules) -> Iterator[Unit]:
                 three_way(contrast.difference >= 0, contrast.high < 0, "closes no more than the limit off its task"),
                 three_way(behind.low > 0, behind.high < 0, "stays behind its own task"),
             ]
-            printed = [paper.cross_transfer(cs, source, task).mean for task in others]
-            cell = Summary(float(np.mean(printed)) * paper.target(cs), np.nan, paper.seeds)
-            unit = judged_unit(
-                cs, source, group, parts, "part of SAC's gap closed off its task", closed(group, sac), cell
-            )
+            printed = float(np.mean([paper.cross_transfer(cs, source, task).mean for task in others]))
+            printed_sac = float(np.mean([paper.cross_baseline(cs, task).mean for task in others]))
+            cell = Summary(printed * paper.target(cs), np.nan, paper.seeds)
+            measure, theirs = "part of SAC's gap closed off its task", closed_in_paper(printed, printed_sac, 1.0)
+            unit = judged_unit(cs, source, group, parts, measure, closed(group, sac), cell, theirs)
             unit = checked(evidence, against(unit, group, own, "own task"), rules, run, group, sac, own, sac_own)
             needed, _ = closing(own.distance, sac_own.distance, rules["needs_diagonal"])
             if unit.state in (MET, UNCLEAR) and needed != MET:
@@ -186,7 +197,12 @@ def better_than(evidence: Evidence, rules: Rules) -> Iterator[Unit]:
             gap = sac.distance.mean or math.nan
             value = Estimate(nearer.difference / gap, nearer.low / gap, nearer.high / gap, theirs.distance.n)
             printed = paper.unseen(other, cs, cs)
-            unit = judged_unit(cs, other, theirs, parts, "distance lost to MT-CSIRL / SAC's gap", value, printed)
+            best, worst = (paper.unseen(name, cs, cs).mean for name in (rules["method"], "sac"))
+            lost = closed_in_paper(best, worst, paper.target(cs)) - closed_in_paper(
+                printed.mean, worst, paper.target(cs)
+            )
+            measure = "distance lost to MT-CSIRL / SAC's gap"
+            unit = judged_unit(cs, other, theirs, parts, measure, value, printed, lost)
             unit = against(unit, theirs, ours, "MT-CSIRL")
             yield checked(evidence, unit, rules, run, ours, theirs, sac)
 

@@ -111,9 +111,9 @@ class Evidence:
         """New agents on ``tasks`` with the reward of ``run``."""
         return self.group(run.cs_reward, tasks, {"stage": "transfer", **run.key}, target)
 
-    def generators(self, run: "Run") -> Group:
-        """The generators of ``run`` on the first of its targets."""
-        return self.group(run.cs_reward, run.tasks, {"stage": "learn_reward", **run.key}, run.targets[0])
+    def generators(self, run: "Run", tasks: Iterable[str] | None = None) -> Group:
+        """The generators of ``run`` on the first of its targets, all its tasks or those given."""
+        return self.group(run.cs_reward, tasks or run.tasks, {"stage": "learn_reward", **run.key}, run.targets[0])
 
     def blocked(self, run: "Run", needs: Iterable[str], share: float) -> str:
         """Which of ``needs`` ("experts", "generators") of ``run`` failed their gate too often; "" if none did."""

@@ -23,6 +23,8 @@ from mtcsirl.published import UNKNOWN as NOT_PRINTED
 
 MET, NOT_MET, UNCLEAR = "met", "not met", "unclear"
 TOO_FEW, BLOCKED, NOT_RUN = "too few seeds", "precondition not met", "not run"
+CORRELATION = "Pearson's r of learned and true reward"
+"""The measure of the claims about correlations."""
 NO_ESTIMATE = Estimate(np.nan, np.nan, np.nan, 0)
 Rules = Mapping[str, Any]
 Answer = tuple[str, str]
@@ -36,7 +38,7 @@ class Unit:
     ``measure``: what the criterion looks at, ``value`` with its 95 % interval; ``ours``: the metric itself over seeds;
     ``effect``: Hedges' g of ours against ``reference``, on the metric; ``difference``: Welch's test of the same;
     ``closer``: probability that one of our agents is closer to the target than one of the reference's; ``prediction``:
-    where the paper's number says that ours should lie.
+    where the paper's number says that ours should lie; ``paper_value``: ``measure`` of the paper's own numbers.
     """
 
     cs_reward: str
@@ -55,6 +57,7 @@ class Unit:
     closer: float = np.nan
     paper: Summary = NOT_PRINTED
     prediction: Interval = UNKNOWN
+    paper_value: float = np.nan
 
     @property
     def inside(self) -> bool | None:
@@ -71,6 +74,7 @@ def judged_unit(
     measure: str,
     value: Estimate,
     paper: Summary = NOT_PRINTED,
+    paper_value: float = np.nan,
 ) -> Unit:
     """A unit whose state is the worst of its answers; its preconditions are yet to be checked."""
     ours = group.metric
@@ -87,6 +91,7 @@ def judged_unit(
         success=group.success,
         paper=paper,
         prediction=prediction_interval(paper, ours.n) if paper.std > 0 else UNKNOWN,
+        paper_value=paper_value,
     )
 
 
@@ -166,6 +171,11 @@ def closed(group: Group, sac: Group) -> Estimate:
     base = sac.distance.mean
     part = summarise(1 - group.distances.mean(axis=1, skipna=False).to_numpy(dtype=float) / base)
     return Estimate(part.mean, *t_interval(part), part.n)
+
+
+def closed_in_paper(paper: float, sac: float, target: float) -> float:
+    """1 - d / d_SAC of the paper's printed means."""
+    return 1 - abs(paper - target) / abs(sac - target)
 
 
 def judge_correlation(r: Estimate, rules: Rules) -> str:

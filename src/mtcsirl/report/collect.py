@@ -19,6 +19,7 @@ from mtcsirl.report.content import (
     ReportData,
     StageCost,
     TableView,
+    TargetLine,
     WhatWasRun,
 )
 from mtcsirl.report.markdown import parse_table
@@ -26,11 +27,7 @@ from mtcsirl.settings import Settings
 from mtcsirl.settings.template import deviations
 from mtcsirl.study import Run, Study
 
-SUMMARY_TARGETS = (
-    ("claims", "the verdicts on all claims"),
-    ("report", "this page"),
-    ("all", "everything"),
-)
+SUMMARY_TARGETS = {"claims": "the verdicts on all claims", "report": "this page", "all": "everything"}
 
 
 def collect(settings: Settings, page: Path, *, partial: bool = False) -> ReportData:
@@ -40,19 +37,20 @@ def collect(settings: Settings, page: Path, *, partial: bool = False) -> ReportD
     """
     study = design(settings)
     results = Path(settings.results)
+    provenance = {run: found for run in study if (found := _json(run, settings, "provenance.json"))}
     missing = [(name, _title(name)) for name in ARTEFACTS if not _picture_or_table(name, settings).is_file()]
     if missing and not partial:
         path = _picture_or_table(missing[0][0], settings)
         raise UserError(f"{path}: not there; make it with `snakemake {missing[0][0]}`, or ask for --partial results")
     there = [name for name in ARTEFACTS if name not in dict(missing)]
     return ReportData(
-        run=_what_was_run(settings, study),
+        run=_what_was_run(settings, study, provenance),
         claims=_claims(results / "claims" / "claims.json", partial),
         tables=tuple(_table(name, settings, page) for name in there if name.startswith("table_")),
         figures=tuple(_figure(name, settings, page) for name in there if name.startswith("figure_")),
         gates=_gates(study, results),
         deviations=tuple(_deviation_lines(settings)),
-        targets=(*((name, _title(name)) for name in ARTEFACTS), *SUMMARY_TARGETS),
+        targets=tuple(_targets(settings, study, provenance)),
         missing=tuple(missing),
         links=_links(page, (("verdicts as data", results / "claims" / "claims.json"),)),
         claims_picture=_optional_picture("claims_picture", "All verdicts", results / "claims" / "claims.png"),
@@ -108,8 +106,15 @@ def _links(page: Path, files: tuple[tuple[str, Path], ...]) -> tuple[tuple[str, 
     return tuple((text, Path(os.path.relpath(file, page.parent)).as_posix()) for text, file in files if file.is_file())
 
 
-def _what_was_run(settings: Settings, study: Study) -> WhatWasRun:
-    provenance = {run: found for run in study if (found := _json(run, settings, "provenance.json"))}
+def _targets(settings: Settings, study: Study, provenance: dict[Run, dict[str, Any]]) -> Iterator[TargetLine]:
+    """Every artefact with the cost of the runs that it needs, as measured; artefacts share runs."""
+    wanted = {name: (_title(name), design(settings, name)) for name in ARTEFACTS}
+    for name, (text, own) in (wanted | {name: (text, study) for name, text in SUMMARY_TARGETS.items()}).items():
+        costs = [provenance[run]["cost"]["cpu_seconds"] for run in own if run in provenance]
+        yield TargetLine(name, text, len(costs), sum(own.jobs().values()), sum(costs))
+
+
+def _what_was_run(settings: Settings, study: Study, provenance: dict[Run, dict[str, Any]]) -> WhatWasRun:
     return WhatWasRun(
         scale=settings.scale,
         seeds=settings.seeds,
@@ -151,7 +156,7 @@ def _claims(path: Path, partial: bool) -> tuple[Claim, ...]:
 
 
 def _claim(found: dict[str, Any]) -> Claim:
-    units = tuple((unit["unit"], unit["paper"], unit["ours"], unit["answer"]) for unit in found["units"])
+    units = tuple(unit["texts"] for unit in found["units"])
     texts = {name: found[name] for name in ("name", "text", "locus", "criterion", "verdict", "reason")}
     return Claim(**texts, units=units)
 

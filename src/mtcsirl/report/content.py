@@ -1,5 +1,6 @@
 """What the start page shows, as plain data: no file is read and none is written here."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 
@@ -28,7 +29,7 @@ class WhatWasRun:
 
 @dataclass(frozen=True)
 class Claim:
-    """One claim with its verdict; ``units`` are (what was judged, paper, ours, answer)."""
+    """One claim with its verdict; ``units`` are what was judged, each with the texts of ``unit_text.COLUMNS``."""
 
     name: str
     text: str
@@ -36,7 +37,7 @@ class Claim:
     criterion: str
     verdict: str
     reason: str
-    units: tuple[tuple[str, str, str, str], ...] = ()
+    units: tuple[Mapping[str, str], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -88,6 +89,20 @@ class DeviationLine:
 
 
 @dataclass(frozen=True)
+class TargetLine:
+    """How to rerun one item: the name of its target, what that makes, and the runs and core seconds behind it.
+
+    ``cpu_seconds`` were measured on the runs that are there (``done`` of ``planned``).
+    """
+
+    target: str
+    text: str
+    done: int
+    planned: int
+    cpu_seconds: float
+
+
+@dataclass(frozen=True)
 class ReportData:
     """Everything on the page. ``missing`` maps an artefact that is not there to its title."""
 
@@ -97,8 +112,7 @@ class ReportData:
     figures: tuple[FigureView, ...]
     gates: tuple[GateLine, ...]
     deviations: tuple[DeviationLine, ...]
-    targets: tuple[tuple[str, str], ...]
-    """(target, what it makes): how to rerun each item."""
+    targets: tuple[TargetLine, ...]
     missing: tuple[tuple[str, str], ...] = ()
     links: tuple[tuple[str, str], ...] = ()
     claims_picture: FigureView | None = None

@@ -6,6 +6,7 @@ from importlib import resources
 from jinja2 import Environment, FunctionLoader, StrictUndefined
 from markupsafe import Markup
 
+from mtcsirl.analysis.unit_text import COLUMNS
 from mtcsirl.report.content import FigureView, ReportData
 
 VERDICTS = {
@@ -40,6 +41,7 @@ def build_report(data: ReportData) -> str:
         verdict_style=VERDICTS,
         verdict_counts=_verdict_counts(data),
         secondary=SECONDARY,
+        unit_columns=COLUMNS,
         command=f"snakemake --cores 2 {CONFIGS.get(data.run.scale, '')}",
     )
 
