@@ -50,7 +50,7 @@ def test_page_has_verdicts_tables_and_deviations_once(findings):
     rows = {name: evaluation(design(SETTINGS, name), as_the_paper_says) for name in ("table_2", "table_4")}
     tables = {name: TABLES[name](frame, SETTINGS) for name, frame in rows.items()}
     page = results_page(findings, tables, SETTINGS, provenance={"commit": "abc"})
-    assert page.count("sac.minibatch = 128") == 1
+    assert page.count(f"sac.minibatch = {SETTINGS.sac.minibatch}") == 1
     assert all(f"### {title}" in page for title in ("Table 2", "Table 4", "C1: reproduced"))
     assert "| commit | abc |" in page
 

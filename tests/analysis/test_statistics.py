@@ -73,6 +73,11 @@ def test_welch_equals_scipy(a, b):
 
 
 @given(seeds)
+def test_interquartile_mean_equals_scipy(values):
+    assert interquartile_mean(values) == pytest.approx(stats.trim_mean(values, 0.25), rel=1e-9, abs=1e-9)
+
+
+@given(seeds)
 def test_t_interval_equals_scipy(values):
     summary = summarise(values)
     if summary.std > 1e-9:

@@ -90,6 +90,11 @@ def test_paper_stands_beside_ours(settings):
     assert "r = 0.50 [0.40, 0.60] (paper: 0.18)" in scatter_caption(select_correlation(data, **KEY), "velocity")
     unknown = select_correlation(data, **KEY | {"cs_reward": "action_norm"})
     assert "paper" not in scatter_caption(unknown, "action_norm")
+    axes = new_figure(2, 2).subplots()
+    drawn = FigureData(settings=settings, scores=data.scores, points=points(0, [0.0, 1.0], [0.0, 1.0]))
+    draw_scatter(axes, select_correlation(drawn, **KEY), "mt_csirl", "velocity")
+    assert axes.texts[0].get_text().endswith("n = 1 seed\npaper: r = 0.18")
+    assert "m/s" in axes.get_xlabel()
 
 
 def test_words_without_interval_or_value():

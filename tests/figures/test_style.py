@@ -75,5 +75,5 @@ def test_reader_settings_have_no_say():
 
 def test_units_on_axes():
     assert quantity_label("velocity") == "velocity (m/s)"
-    assert quantity_label("action_norm") == "action norm"
+    assert quantity_label("action_norm") == r"action norm ($\Vert a\Vert_1$)", "no unit, so the formula"
     assert quantity_label("my_cs_reward") == "my cs reward"

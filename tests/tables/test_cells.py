@@ -49,7 +49,20 @@ def test_ratio_divides_by_the_target():
 def test_percent_is_printed_as_percent():
     cell = make_cell(rows([[1.0], [0.9]], metric="success"), "success", Summary(0.635, 0.012, 5))
     assert cell.lines(1, 100.0)[0] == "95.0±7.1, n=2"
-    assert cell.lines(1, 100.0)[2].startswith("63.5±1.2, outside [")
+    assert cell.lines(1, 100.0)[2].startswith("63.5±1.20, outside [")
+
+
+def test_a_share_stays_between_0_and_1():
+    cell = make_cell(rows([[1.0], [0.9], [1.0]], metric="success"), "success", Summary(0.99, 0.02, 5))
+    assert cell.interval.low < 0.9
+    assert (cell.interval.high, cell.prediction.high) == (1.0, 1.0)
+    assert cell.inside is True
+
+
+def test_spreads_of_the_paper_keep_their_digits():
+    """Its 99.9±0.01 % is not 99.9±0.0 %, outside [99.9, 99.9]."""
+    cell = make_cell(rows([[1.0]] * 5, metric="success"), "success", Summary(0.999, 0.0001, 5))
+    assert cell.lines(1, 100.0)[2] == "99.9±0.01, outside [99.88, 99.92]"
 
 
 def test_missing_doubtful_and_gated_agents_are_marked():

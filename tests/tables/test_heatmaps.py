@@ -5,6 +5,7 @@ from matplotlib.figure import Figure
 from mtcsirl.design import design
 from mtcsirl.published import load_published
 from mtcsirl.settings import Settings
+from mtcsirl.tables import heatmaps
 from mtcsirl.tables.heatmaps import heat_map, heat_map_caption, heat_map_matrices
 from tests.analysis.made_up import evaluation
 
@@ -61,3 +62,11 @@ def test_nothing_there_yet_still_shows_the_paper():
 def test_caption_names_the_table_and_n():
     assert "Table 3" in heat_map_caption("velocity", SETTINGS)
     assert "n = 2" in heat_map_caption("velocity", SETTINGS)
+
+
+@pytest.mark.parametrize("part", np.linspace(0, 1, 21))
+def test_numbers_can_be_read_on_every_colour(part):
+    """Black or white ink, whichever is chosen, has the contrast of 4.5 that WCAG asks of small text."""
+    luminance = heatmaps._luminance(part)
+    contrast = 1.05 / (luminance + 0.05) if luminance < 0.18 else (luminance + 0.05) / 0.05
+    assert contrast >= 4.5

@@ -14,6 +14,7 @@ from tests.analysis.made_up import evaluation
 
 SETTINGS = Settings(
     methods=("mt_airl", "mt_vairl", "mt_csirl", "mt_csirl_lt"),
+    sac={"minibatch": 128, "discount": 0.99, "hidden_sizes": (256, 256)},
     multi_target={"tasks": ("reach-wall", "push-back"), "train_targets": (1, 2)},
     multi_task={
         "train_tasks": ("reach", "door-close"),
@@ -115,6 +116,7 @@ def test_missing_cells_are_marked_and_explained(rows):
     row = next(line for line in text.splitlines() if line.startswith("| MT-CSIRL |"))
     assert row.count("n=3 ‡2") == 4
     assert "‡ missing agents" in text
+    assert table.notes[1] == "incomplete: 4 of 24 cells lack seeds"
 
 
 def test_own_method_gets_its_row(rows):

@@ -140,8 +140,9 @@ def hedges_g(first: Summary, second: Summary, confidence: float = 0.95) -> Estim
 
 def interquartile_mean(matrix: ArrayLike) -> float:
     """Mean of the middle half of all values, runs and tasks pooled (25 % trimmed from each end)."""
-    known = _known(matrix)
-    return float(stats.trim_mean(known, 0.25)) if known.size else np.nan
+    known = np.sort(_known(matrix))  # scipy's trim_mean takes ten times as long, which a bootstrap feels
+    cut = known.size // 4
+    return float(known[cut : known.size - cut].mean()) if known.size else np.nan
 
 
 def probability_of_improvement(first: ArrayLike, second: ArrayLike) -> float:

@@ -51,6 +51,6 @@ def caption(data: FigureData) -> str:
         f"{letters}: Expert maximises r_task and the true cs-reward, MT-CSIRL r_task and the reward "
         f"learned from {', '.join(data.settings.multi_task.train_tasks)}, SAC r_task alone; training episodes of the "
         "stochastic policy. Red line: target. Lines and bands: mean and 95 % t-interval over seeds "
-        f"({numbers}); bands are cut off at the frame. ({chr(ord('a') + len(metrics))}) "
-        f"{scatter_caption(found, _SCATTER)} Scored on {data.settings.multi_task.unseen_tasks[0]}."
+        f"({numbers}); bands are cut off at the frame, curves end where the shortest run does. "
+        f"({chr(ord('a') + len(metrics))}) {scatter_caption(found, _SCATTER)} Scored on {data.settings.multi_task.unseen_tasks[0]}."
     )

@@ -17,6 +17,7 @@ from mtcsirl.figures.style import (
     look,
     new_figure,
     quantity,
+    quantity_label,
     scale_notes,
     styled,
 )
@@ -92,7 +93,7 @@ def draw_scatter(axes: Axes, found: Correlation, method: str, cs_reward: str) ->
     A learned reward is known up to scale and offset, so each seed's is standardised (mean 0, standard deviation 1).
     The line is the least-squares fit over the seeds, which all weigh the same.
     """
-    axes.set_xlabel(f"true cs-reward ({quantity(cs_reward)})")
+    axes.set_xlabel(f"true cs-reward,\n{quantity_label(cs_reward)}")
     axes.set_ylabel("learned cs-reward\n(standardised per seed)")
     if found.points.empty:
         axes.set_yticks([])
@@ -115,8 +116,9 @@ def draw_scatter(axes: Axes, found: Correlation, method: str, cs_reward: str) ->
         axes.plot(ends, slope * ends + offset, color="black", linewidth=1, linestyle="--")
     low, high = np.percentile(standard["learned"], [0.2, 99.8])
     margin = 0.08 * max(high - low, 1e-6)
-    axes.set_ylim(low - margin, high + 6 * margin)
-    words = f"{found.words()}\n{found.transition_name}\n{found.counts()}"
+    axes.set_ylim(low - margin, high + 7 * margin)  # room for the words above the points
+    paper = "" if np.isnan(found.paper) else f"\npaper: r = {found.paper:.2f}"
+    words = f"{found.words()}\n{found.transition_name}\n{found.counts()}{paper}"
     axes.text(
         0.03, 0.98, words, transform=axes.transAxes, va="top", fontsize=6.5,
         bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1},
@@ -150,7 +152,8 @@ def scatter_caption(found: Correlation, cs_reward: str) -> str:
     return (
         f"True against learned {quantity(cs_reward)} cs-reward on {found.transition_name}: "
         f"Pearson {found.words()}{paper}, {interval}, {found.counts()} with up to {found.per_seed:,} transitions each; "
-        f"at most {SHOWN_POINTS:,} points are drawn. The learned reward is standardised per seed."
+        f"at most {SHOWN_POINTS:,} points are drawn, without the outermost 0.4 %. The learned reward is standardised "
+        "per seed."
     )
 
 

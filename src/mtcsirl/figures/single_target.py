@@ -90,7 +90,8 @@ def caption(data: FigureData, artefact: str, task: str, metrics: list[str], *, s
         f"Learned from {task} with one target and tried on the same. {letters}: the agent during IRL "
         "(IRL agent), a new agent trained from scratch on r_task + the learned cs-reward (Transferred) and an agent "
         "without any cs-reward (SAC), training episodes of the stochastic policy. Red line: target. "
-        f"Lines and bands: mean and 95 % t-interval over seeds ({numbers}); bands are cut off at the frame."
+        f"Lines and bands: mean and 95 % t-interval over seeds ({numbers}); bands are cut off at the frame, "
+        "curves end where the shortest run does."
     )
     warm_up = warm_up_steps(data)
     if warm_up:

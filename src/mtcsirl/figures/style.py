@@ -49,10 +49,11 @@ LOOKS: dict[str, Look] = {
 
 _QUANTITIES = {
     "velocity": ("velocity", "m/s"),
-    "action_norm": ("action norm", ""),
-    "success": ("success rate", ""),
-    "task_reward": ("task reward per step", ""),
+    "action_norm": ("action norm", "$\\Vert a\\Vert_1$"),
+    "success": ("success rate", "share of episodes"),
+    "task_reward": ("task reward", "per step"),
 }
+"""Name and, for an axis, unit; the action norm has none, so its formula stands there."""
 
 
 def look(method: str) -> Look:
@@ -66,7 +67,7 @@ def quantity(metric: str) -> str:
 
 
 def quantity_label(metric: str) -> str:
-    """Axis label of a metric with its unit."""
+    """Axis label of a metric with its unit, as in ``velocity (m/s)``."""
     name, unit = _QUANTITIES.get(metric, (metric.replace("_", " "), ""))
     return f"{name} ({unit})" if unit else name
 

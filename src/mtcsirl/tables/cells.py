@@ -20,6 +20,7 @@ from mtcsirl.analysis.statistics import (
 )
 
 DASH = "–"
+PAPER_DIGITS = 2
 RESAMPLES = 500
 MARKS = {"below": "†", "missing": "‡", "doubtful": "§"}
 MARK_TEXTS = {
@@ -61,12 +62,16 @@ class Cell:
         return {kind: getattr(self, kind) for kind in MARKS if getattr(self, kind)}
 
     def lines(self, digits: int = 2, factor: float = 1.0) -> tuple[str, str, str]:
-        """The cell as three texts: ours, its t-interval, the paper's. ``factor`` 100 prints shares as percent."""
+        """The cell as three texts: ours, its t-interval, the paper's. ``factor`` 100 prints shares as percent.
+
+        The paper's spreads keep the two digits that it prints: its smallest, 0.01 %, is not 0.
+        """
         marks = "".join(f" {MARKS[kind]}{count}" for kind, count in self.marks.items())
-        ours = DASH if self.ours.n == 0 else f"{_spread(self.ours, digits, factor)}, n={self.ours.n}"
+        ours = DASH if self.ours.n == 0 else f"{_spread(self.ours, digits, digits, factor)}, n={self.ours.n}"
         verdict = {None: "", True: ", inside", False: ", outside"}[self.inside]
-        prediction = f"{verdict} {_bounds(self.prediction, digits, factor)}" if verdict else ""
-        return ours + marks, _bounds(self.interval, digits, factor), _spread(self.paper, digits, factor) + prediction
+        prediction = f"{verdict} {_bounds(self.prediction, PAPER_DIGITS, factor)}" if verdict else ""
+        paper = _spread(self.paper, digits, PAPER_DIGITS, factor) + prediction
+        return ours + marks, _bounds(self.interval, digits, factor), paper
 
     def numbers(self) -> dict[str, Any]:
         """The cell as one row of a data frame."""
@@ -104,9 +109,9 @@ def make_cell(rows: pd.DataFrame, metric: str, paper: Summary, scale: float = 1.
     status = chosen["status"]
     return Cell(
         ours=ours,
-        interval=t_interval(ours),
+        interval=_possible(t_interval(ours), metric),
         paper=paper,
-        prediction=prediction_interval(paper, ours.n) if paper.std > 0 else UNKNOWN,
+        prediction=_possible(prediction_interval(paper, ours.n), metric) if paper.std > 0 else UNKNOWN,
         deterministic=summarise(greedy).mean,
         iqm=_interquartile(chosen, scale),
         expected=chosen["seed"].nunique(),
@@ -114,6 +119,13 @@ def make_cell(rows: pd.DataFrame, metric: str, paper: Summary, scale: float = 1.
         missing=int((status == MISSING).sum()),
         doubtful=int(status.isin([DUPLICATED, FOREIGN]).sum()),
     )
+
+
+def _possible(interval: Interval, metric: str) -> Interval:
+    """The part of ``interval`` that ``metric`` can take; a share of episodes lies in [0, 1]."""
+    if metric != "success" or np.isnan(interval.low):
+        return interval
+    return Interval(max(interval.low, 0.0), min(interval.high, 1.0))
 
 
 def _interquartile(rows: pd.DataFrame, scale: float) -> Estimate:
@@ -129,11 +141,11 @@ def per_seed(rows: pd.DataFrame) -> np.ndarray:
     return matrix(rows).mean(axis=1, skipna=False).to_numpy(dtype=float)
 
 
-def _spread(summary: Summary, digits: int, factor: float) -> str:
+def _spread(summary: Summary, digits: int, spread_digits: int, factor: float) -> str:
     if np.isnan(summary.mean):
         return DASH
     mean = f"{factor * summary.mean:.{digits}f}"
-    return mean if np.isnan(summary.std) else f"{mean}±{factor * summary.std:.{digits}f}"
+    return mean if np.isnan(summary.std) else f"{mean}±{factor * summary.std:.{spread_digits}f}"
 
 
 def _bounds(interval: Interval, digits: int, factor: float) -> str:

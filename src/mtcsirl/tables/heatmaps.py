@@ -2,6 +2,7 @@
 
 import numpy as np
 import pandas as pd
+from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.image import AxesImage
@@ -11,11 +12,14 @@ from mtcsirl.published import Published, load_published
 from mtcsirl.settings import Settings
 from mtcsirl.tables.cross_transfer import baseline_cell, transfer_cell
 
+COLOURS = colormaps["cividis"]
+LUMINANCE = (0.2126, 0.7152, 0.0722)
+"""Weights of linear red, green and blue; black ink reads better than white above 0.18."""
 SHORT = {"button-press-topdown-wall": "BP-topdown-wall"}
 CAPTION = (
     "{quantity} of new agents divided by its target: the paper's Table {number} (left) and ours (right) on one colour "
     "scale. Rows: task whose reward was used, last row: plain SAC; columns: task of the new agent. Mean over n = {n} "
-    "seeds; empty: no seed there yet; star: fewer seeds than the study asks for."
+    "seeds; hatched: no seed there yet; star: fewer seeds than the study asks for."
 )
 
 
@@ -60,7 +64,8 @@ def heat_map_caption(cs_reward: str, settings: Settings) -> str:
 
 
 def _draw(axes: Axes, values: np.ndarray, names: list[str], top: float) -> AxesImage:
-    image = axes.imshow(np.ma.masked_invalid(values), cmap="cividis", vmin=0.0, vmax=top, aspect="auto")
+    axes.patch.set(facecolor="0.96", edgecolor="0.75", hatch="////", linewidth=0)  # shows where a cell is missing
+    image = axes.imshow(np.ma.masked_invalid(values), cmap=COLOURS, vmin=0.0, vmax=top, aspect="auto")
     axes.set_xticks(range(len(names)), names, rotation=40, ha="right", rotation_mode="anchor")
     axes.set_yticks(range(len(names) + 1), [*names, "SAC"])
     axes.axhline(len(names) - 0.5, color="white", linewidth=2)
@@ -72,7 +77,12 @@ def _draw(axes: Axes, values: np.ndarray, names: list[str], top: float) -> AxesI
 def _write(axes: Axes, values: np.ndarray, starred: np.ndarray, top: float) -> None:
     for (row, column), value in np.ndenumerate(values):
         if np.isfinite(value):
-            ink = "white" if value < 0.55 * top else "black"
+            ink = "white" if _luminance(value / top) < 0.18 else "black"
             weight = "bold" if row == column else "normal"
             text = f"{value:.2f}{'*' if starred[row, column] else ''}"
             axes.text(column, row, text, ha="center", va="center", color=ink, fontsize=6.5, fontweight=weight)
+
+
+def _luminance(part: float) -> float:
+    """Relative luminance of the colour at ``part`` of the scale, in [0, 1]."""
+    return float(np.dot(LUMINANCE, np.array(COLOURS(part)[:3]) ** 2.2))

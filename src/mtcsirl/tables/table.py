@@ -172,10 +172,13 @@ def result_table(
         for label, entries in rows
         for column, entry in zip(columns, entries, strict=True)
     ]
-    used = {kind for _, entries in rows for entry in entries for kind in entry.cell.marks}
+    cells = [entry.cell for _, entries in rows for entry in entries]
+    used = {kind for cell in cells for kind in cell.marks}
     marks = [text for kind, text in MARK_TEXTS.items() if kind in used]
     frame = pd.DataFrame(numbers).assign(scale=settings.scale)
-    notes = (*scale_notes(settings), *remarks, *marks, *deviation_notes(settings))
+    lacking = sum(cell.ours.n < cell.expected for cell in cells)
+    gaps = [f"incomplete: {lacking} of {len(cells)} cells lack seeds"] if lacking else []
+    notes = (*scale_notes(settings), *gaps, *remarks, *marks, *deviation_notes(settings))
     return Table(name, caption, corner, tuple(columns), tuple(lines), frame, notes)
 
 
