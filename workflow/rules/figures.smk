@@ -21,7 +21,12 @@ for figure in FIGURES:
             code=code(f"figures/{figure}.py", "analysis/rows.py", "rendering.py"),
         output:
             pdf=f"<figures>/{figure}.pdf",
-            png=report(f"<figures>/{figure}.png", caption=f"../report/{figure}.rst", category="Figures"),
+            png=report(
+                f"<figures>/{figure}.png",
+                caption=f"../report/{figure}.rst",
+                category="Figures",
+                labels={"figure": title(figure)},
+            ),
         log:
             f"<logs>/figures/{figure}.log",
         threads: 1

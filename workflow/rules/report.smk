@@ -10,9 +10,19 @@ rule claims:
         code=code("claims"),
     output:
         json="<results>/claims/claims.json",
-        markdown=report("<results>/claims/claims.md", caption="../report/claims.rst", category="Claims"),
+        markdown=report(
+            "<results>/claims/claims.md",
+            caption="../report/claims.rst",
+            category="Claims",
+            labels={"claims": "C1 to C12", "form": "every number"},
+        ),
         pdf="<results>/claims/claims.pdf",
-        png=report("<results>/claims/claims.png", caption="../report/claims.rst", category="Claims"),
+        png=report(
+            "<results>/claims/claims.png",
+            caption="../report/claims.rst",
+            category="Claims",
+            labels={"claims": "C1 to C12", "form": "one page"},
+        ),
     log:
         "<logs>/claims.log",
     threads: 1
@@ -34,7 +44,12 @@ rule report:
         page=multiext(str(PACKAGE / "report/page"), ".html", ".css"),
         code=code("report"),
     output:
-        report("<results>/report/index.html", caption="../report/start.rst", category="Start page"),
+        report(
+            "<results>/report/index.html",
+            caption="../report/start.rst",
+            category="Start page",
+            labels={"page": "everything, to be read from the top"},
+        ),
     log:
         "<logs>/report.log",
     threads: 1

@@ -3,6 +3,26 @@
 TABLES = [name for name in ARTEFACTS if name.startswith("table_")]
 HEAT_MAPS = ["table_1", "table_3"]  # drawn beside the paper's as well
 
+
+def title(artefact):
+    """As in "Table 2" or "Figure S1", for labels."""
+    kind, _, number = artefact.partition("_")
+    return f"{kind.capitalize()} {number.upper()}"
+
+
+def heat_map(table):
+    """The files of a table's heat map, none for tables without one."""
+    if table not in HEAT_MAPS:
+        return []
+    picture = report(
+        f"<results>/tables/{table}.png",
+        caption=f"../report/{table}.rst",
+        category="Tables",
+        labels={"table": title(table), "form": "heat map, paper and ours"},
+    )
+    return [f"<results>/tables/{table}.pdf", picture]
+
+
 for table in TABLES:
 
     rule:
@@ -14,9 +34,14 @@ for table in TABLES:
             code=code(f"tables/{table}.py", "analysis/rows.py", *["tables/heatmaps.py"][: table in HEAT_MAPS]),
         output:
             csv=f"<results>/tables/{table}.csv",
-            markdown=report(f"<results>/tables/{table}.md", caption=f"../report/{table}.rst", category="Tables"),
+            markdown=report(
+                f"<results>/tables/{table}.md",
+                caption=f"../report/{table}.rst",
+                category="Tables",
+                labels={"table": title(table), "form": "numbers"},
+            ),
             latex=f"<results>/tables/{table}.tex",
-            heat_map=[f"<results>/tables/{table}.{ending}" for ending in ("pdf", "png") if table in HEAT_MAPS],
+            heat_map=heat_map(table),
         log:
             f"<logs>/tables/{table}.log",
         threads: 1
