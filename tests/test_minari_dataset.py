@@ -7,6 +7,7 @@ import pandas as pd
 import pytest
 
 from mtcsirl import storage
+from mtcsirl.cli import main
 from mtcsirl.errors import UserError
 from mtcsirl.minari_dataset import export_minari
 
@@ -37,10 +38,14 @@ def demonstrations(tmp_path: Path) -> Path:
     return tmp_path / "demonstrations.parquet"
 
 
-def test_minari_reads_what_was_written(demonstrations: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_minari_reads_what_was_written(
+    demonstrations: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     monkeypatch.setenv("MINARI_DATASETS_PATH", "")
-    name = export_minari(demonstrations, tmp_path / "datasets")
-    assert name == "mtcsirl/reach-t3-v0"
+    options = ["--demonstrations", str(demonstrations), "--output", str(tmp_path / "datasets")]
+    assert main(["export-demonstrations", *options]) == 0
+    name = "mtcsirl/reach-t3-v0"
+    assert capsys.readouterr().out.strip().endswith(name)
     dataset = minari.load_dataset(name)
     assert dataset.total_episodes == EPISODES
     frame = storage.read_parquet(demonstrations)

@@ -1,6 +1,7 @@
 """Stored policies: they come back as they were, bad files are refused in one line, others can read an export."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,6 +10,8 @@ from stable_baselines3 import SAC
 from mtcsirl.agents.export import export_sb3
 from mtcsirl.agents.policy import load_policy, save_policy
 from mtcsirl.agents.sac import FusedSac
+from mtcsirl.cli import main
+from mtcsirl.environments import OBSERVATION_MAPS, make_environment
 from mtcsirl.errors import UserError
 
 
@@ -72,12 +75,26 @@ def test_missing_policy_is_one_line(tmp_path):
         load_policy(tmp_path)
 
 
-def test_exported_zip_is_an_ordinary_model(policy, observations, tmp_path):
+def test_exported_zip_acts_on_meta_worlds_own_observations(policy, tmp_path):
+    """Stable-baselines3's model on raw observations of a real rollout, ours on the mapped ones."""
     save_policy(policy, tmp_path)
-    export_sb3(tmp_path, tmp_path / "model.zip")
+    assert main(["export-policy", "--policy", str(tmp_path), "--output", str(tmp_path / "model.zip")]) == 0
     model = SAC.load(tmp_path / "model.zip", device="cpu")
-    actions, _ = model.predict(observations, deterministic=True)
-    np.testing.assert_allclose(actions, policy.act(observations), atol=1e-6)
+    environment = make_environment("reach", 0, observation="raw")
+    observation, _ = environment.reset()
+    for _ in range(20):
+        action, _ = model.predict(observation, deterministic=True)
+        mapped = OBSERVATION_MAPS["mapped"].apply(observation.astype(np.float64))
+        np.testing.assert_allclose(action, policy.act(mapped.astype(np.float32)), atol=1e-4)
+        observation, *_ = environment.step(action)
+
+
+def test_exported_zip_of_a_policy_that_saw_raw_observations(policy, observations, tmp_path):
+    raw = replace(policy, observation="raw")
+    save_policy(raw, tmp_path)
+    export_sb3(tmp_path, tmp_path / "model.zip")
+    actions, _ = SAC.load(tmp_path / "model.zip", device="cpu").predict(observations, deterministic=True)
+    np.testing.assert_allclose(actions, raw.act(observations), atol=1e-6)
 
 
 def test_export_refuses_bounds_that_the_other_side_lacks(small_sac, tmp_path):

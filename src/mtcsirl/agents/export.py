@@ -10,7 +10,8 @@ import numpy as np
 import torch
 
 from mtcsirl import storage
-from mtcsirl.agents.policy import load_policy
+from mtcsirl.agents.policy import Policy, load_policy
+from mtcsirl.environments import OBSERVATION_MAPS, OBSERVATION_SIZE
 from mtcsirl.errors import UserError
 
 
@@ -18,9 +19,9 @@ from mtcsirl.errors import UserError
 def export_sb3(folder: Path | str, file: Path | str, name: str = "policy") -> None:
     """Write the policy in `folder` as a zip that `stable_baselines3.SAC.load` reads.
 
-    The zip holds the trained actor beside fresh critics: enough to act, not to go on training. It says nothing about
-    the observation map: the actor expects observations as its `policy.json` says. Such a zip contains pickled
-    objects; this package writes it for others and never reads one.
+    The zip holds the trained actor beside fresh critics: enough to act, not to go on training. The observation map of
+    `policy.json` is affine and goes into the first layer, so the model acts on Meta-World's own observations. Such a
+    zip contains pickled objects; this package writes it for others and never reads one.
 
     Raises UserError for a policy whose log_std bounds stable-baselines3 does not have.
     """
@@ -36,11 +37,21 @@ def export_sb3(folder: Path | str, file: Path | str, name: str = "policy") -> No
     model = SAC("MlpPolicy", spaces, buffer_size=1, policy_kwargs={"net_arch": sizes[:-1]}, device="cpu")
     actor: Any = model.actor
     hidden = [layer for layer in actor.latent_pi if isinstance(layer, torch.nn.Linear)]
-    weights = [*policy.weights[:-1], *np.split(policy.weights[-1], 2)]
-    biases = [*policy.biases[:-1], *np.split(policy.biases[-1], 2)]
+    first, offset = _on_raw_observations(policy)
+    weights = [first, *policy.weights[1:-1], *np.split(policy.weights[-1], 2)]
+    biases = [offset, *policy.biases[1:-1], *np.split(policy.biases[-1], 2)]
     for layer, weight, bias in zip([*hidden, actor.mu, actor.log_std], weights, biases, strict=True):
         layer.weight.copy_(torch.from_numpy(weight))
         layer.bias.copy_(torch.from_numpy(bias))
     buffer = io.BytesIO()
     model.save(buffer)
     storage.write_bytes(file, buffer.getvalue())
+
+
+def _on_raw_observations(policy: Policy) -> tuple[np.ndarray, np.ndarray]:
+    """The first layer with the observation map inside: W (A x + c) + b = (W A) x + (W c + b)."""
+    see = OBSERVATION_MAPS[policy.observation].apply
+    nothing = see(np.zeros(OBSERVATION_SIZE))
+    matrix = (see(np.eye(OBSERVATION_SIZE)) - nothing).T
+    weight = policy.weights[0].astype(np.float64)
+    return (weight @ matrix).astype(np.float32), (weight @ nothing + policy.biases[0]).astype(np.float32)

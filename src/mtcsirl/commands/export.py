@@ -12,7 +12,7 @@ def register(verbs: Verbs) -> None:
         verbs,
         "export-policy",
         _export_policy,
-        does="write a stored policy as a zip that stable_baselines3.SAC.load reads",
+        does="write a stored policy as a zip that stable_baselines3.SAC.load reads; it acts on raw observations",
         needs="the folder of a trained agent",
         writes="--output; it holds pickled objects, which this package itself never reads",
     )
