@@ -4,7 +4,8 @@ import dataclasses
 
 import pytest
 
-from mtcsirl.design import ARTEFACTS, FIGURE_TASKS, design
+from mtcsirl.ablations import ABLATIONS
+from mtcsirl.design import ARTEFACTS, FIGURE_TASKS, design, variants
 from mtcsirl.errors import UserError
 from mtcsirl.settings import Settings
 from mtcsirl.settings.loading import load
@@ -180,3 +181,32 @@ def test_runs_are_plain_values() -> None:
     assert run == Expert("velocity", "reach", 1, 3)
     with pytest.raises(dataclasses.FrozenInstanceError):
         run.seed = 4  # type: ignore[misc]
+
+
+@pytest.mark.parametrize("name", ABLATIONS)
+def test_an_ablation_trains_its_variants_and_shares_the_rest(settings: Settings, name: str) -> None:
+    main, own = {run.folder for run in design(settings)}, set(design(settings, name))
+    shown = variants(settings, name)
+    assert set(shown) == set(ABLATIONS[name].variants)
+    assert {run for study in shown.values() for run in study} <= own
+    new = {run.folder for run in own} - main
+    assert {run.folder for run in shown["default"]} & new == set() or not set(settings.ablations.seeds) <= set(
+        settings.seeds
+    )
+    for variant in list(shown)[1:]:
+        folders = {run.folder for run in shown[variant]} & new
+        assert folders, f"{variant} trains nothing"
+        assert all(folder.startswith(f"ablations/{name}/{variant}/") for folder in folders)
+
+
+def test_a_variant_changes_the_settings_that_it_names_and_no_others() -> None:
+    settings = Settings()
+    runs = {name: study.irl_runs[0] for name, study in variants(settings, "ablation_replay").items()}
+    default, latest = (runs[name].settings(settings).model_dump() for name in ("default", "latest"))
+    assert (default["irl"]["generator_replay"], latest["irl"]["generator_replay"]) == (20, 1)
+    latest["irl"]["generator_replay"] = 20
+    assert latest == default
+
+
+def test_ablations_are_no_part_of_the_study(settings: Settings) -> None:
+    assert not [run for run in design(settings) if run.folder.startswith("ablations/")]

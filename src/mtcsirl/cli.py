@@ -15,6 +15,7 @@ from typing import NoReturn
 from mtcsirl import __version__
 from mtcsirl.commands import artefacts, export, stages, study, validate, video
 from mtcsirl.errors import UserError
+from mtcsirl.extensions import load_from_environment
 
 THREADS = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS")
 
@@ -48,6 +49,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     logging.basicConfig(level=logging.INFO, format="%(asctime)s %(message)s", datefmt="%H:%M:%S", stream=sys.stderr)
     signal.signal(signal.SIGTERM, _stop)
     try:
+        load_from_environment()
         parsed = parser().parse_args(arguments)
         parsed.run(parsed)
         sys.stdout.flush()

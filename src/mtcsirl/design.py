@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 
+from mtcsirl.ablations import ABLATIONS
 from mtcsirl.errors import UserError
 from mtcsirl.settings import Settings
 from mtcsirl.study import (
@@ -184,29 +185,58 @@ def _needs(settings: Settings, run: Run) -> Iterator[Run]:
 def _readers(settings: Settings) -> dict[Demonstrations, tuple[str, ...]]:
     """Which experiments read each demonstration set, over the whole study, whatever artefact was asked for."""
     readers: dict[Demonstrations, set[str]] = {}
-    for rule in ARTEFACTS.values():
-        for run in rule(settings):
-            irl = run.irl if isinstance(run, Transfer | Score) else None
-            for demonstrations in _needs(settings, irl) if irl else ():
-                readers.setdefault(demonstrations, set()).add(irl.experiment)  # type: ignore[arg-type, union-attr]
+    shown = [run for rule in ARTEFACTS.values() for run in rule(settings)]
+    shown += [
+        run for name, ablation in ABLATIONS.items() for v in ablation.variants for run in _runs(settings, name, v)
+    ]
+    for irl in {run.irl if isinstance(run, Transfer | Score) else run for run in shown}:
+        for demonstrations in _needs(settings, irl) if isinstance(irl, IrlRun) else ():
+            readers.setdefault(demonstrations, set()).add(irl.experiment)  # type: ignore[arg-type, union-attr]
     return {demonstrations: tuple(sorted(names)) for demonstrations, names in readers.items()}
 
 
+def _runs(settings: Settings, ablation: str, name: str) -> Iterator[Run]:
+    """What the variant ``name`` of ``ablation`` shows, with runs of the main study where it changes nothing."""
+    chosen, variant = settings.ablations, ABLATIONS[ablation].variants[name]
+    anew = ABLATIONS[ablation].agents if variant.agents is None else variant.agents
+
+    def of(agent: str) -> str:
+        return f"{ablation}/{name}" if variant.changes and agent in anew else ""
+
+    for task in chosen.tasks:
+        for seed in chosen.seeds:
+            irl = replace(_single_irl(task, chosen.cs_reward, seed), variant=of("irl"))
+            runs: dict[str, Run] = {
+                "expert": Expert(chosen.cs_reward, task, EVALUATION_TARGET, seed, of("expert")),
+                "irl": irl,
+                "transfer": Transfer(irl, task, EVALUATION_TARGET, seed, of("transfer")),
+            }
+            yield from (runs[agent] for agent in ABLATIONS[ablation].agents)
+
+
+def variants(settings: Settings, ablation: str) -> dict[str, Study]:
+    """The runs that each variant of an ablation shows, by the variant's name."""
+    return {name: _study(set(_runs(settings, ablation, name)), {}) for name in ABLATIONS[ablation].variants}
+
+
 def design(settings: Settings, artefact: str | None = None) -> Study:
-    """All runs of the study, or those that ``artefact`` needs; agents shared by artefacts appear once."""
-    if artefact is not None and artefact not in ARTEFACTS:
-        raise UserError(f"unknown artefact {artefact!r}; allowed: {', '.join(ARTEFACTS)}")
-    open_runs: list[Run] = []
-    for name in [artefact] if artefact else ARTEFACTS:
-        open_runs.extend(ARTEFACTS[name](settings))
+    """All runs of the study, or those that an artefact or an ablation needs; shared agents appear once."""
+    if artefact in ABLATIONS:
+        open_runs = [run for name in ABLATIONS[artefact].variants for run in _runs(settings, artefact, name)]
+    elif artefact is None or artefact in ARTEFACTS:
+        open_runs = [run for name in ([artefact] if artefact else ARTEFACTS) for run in ARTEFACTS[name](settings)]
+    else:
+        raise UserError(f"unknown artefact {artefact!r}; allowed: {', '.join((*ARTEFACTS, *ABLATIONS))}")
     found: set[Run] = set()
     while open_runs:
         run = open_runs.pop()
         if run not in found:
             found.add(run)
             open_runs.extend(_needs(settings, run))
-    readers = _readers(settings)
+    return _study(found, _readers(settings))
 
+
+def _study(found: set[Run], readers: dict[Demonstrations, tuple[str, ...]]) -> Study:
     def of(kind: type) -> tuple:
         return tuple(sorted(run for run in found if isinstance(run, kind)))
 

@@ -14,7 +14,7 @@ import torch
 
 from mtcsirl.agents.policy import Policy, load_policy
 from mtcsirl.agents.relabelling import ground_truth
-from mtcsirl.analysis.correlation import epic_distance, epic_values, views
+from mtcsirl.analysis.correlation import epic_distance, epic_values, nuisance, remove, views
 from mtcsirl.analysis.statistics import Array, cluster_bootstrap
 from mtcsirl.demonstrations import VECTORS, as_transitions, collect_demonstrations
 from mtcsirl.environments import ACTION_SIZE, EPISODE_STEPS
@@ -61,9 +61,9 @@ def score(
 
     Sets: ``expert`` and ``sac``, stochastic episodes of the policies in the folders ``expert`` and ``baseline`` on
     ``task`` and ``target``; ``uniform``, random actions there; ``generator``, the last rollouts of the IRL run on its
-    own tasks. Statistics: see :mod:`mtcsirl.analysis.correlation`; ``epic`` is a distance, and -r_task, which no
-    function computes, counts there as its own canonical form. Intervals are cluster-bootstrap intervals over episodes;
-    the controls have none.
+    own tasks; ``across``, all of these together, so that what differs is the policy. Statistics: see
+    :mod:`mtcsirl.analysis.correlation`; ``epic`` is a distance, and -r_task, which no function computes, counts there
+    as its own canonical form. Intervals are cluster-bootstrap intervals over episodes; the controls have none.
 
     Raises:
         UserError: a file is missing or damaged; the learned reward is of another cs-reward or observation.
@@ -74,13 +74,14 @@ def score(
     functions: dict[str, RewardFunction] = {"learned": learned, **_controls(learned, truth, seed)}
     rows: list[dict[str, Any]] = []
     points: list[pd.DataFrame] = []
-    for name, chosen in _sets(settings, reward, expert, baseline, task, target, seed):
+    sets = dict(_sets(settings, reward, expert, baseline, task, target, seed))
+    for name, chosen in (sets | {"across": _together(list(sets.values()))}).items():
         for function in functions:
             rows += [
                 {"transitions": name, "reward": function, **row}
                 for row in score_rows(functions[function], truth, chosen, settings, seed, function == "learned")
             ]
-        points.append(_points(name, chosen, truth, learned))
+        points.append(_points(name, chosen, truth, learned, settings.discount))
     key = {"experiment": learned.about.get("experiment", ""), "method": learned.method, "cs_reward": cs_reward}
     write_csv(output / "scores.csv", pd.DataFrame(rows).assign(**key, task=task, target=target, seed=seed))
     write_parquet(output / "points.parquet", pd.concat(points, ignore_index=True))
@@ -157,6 +158,16 @@ def _sets(
     yield "generator", last_episodes(read_parquet(reward / "samples.parquet", columns), count, observation)
 
 
+def _together(sets: list[TransitionSet]) -> TransitionSet:
+    """One set of several; no episode is in two of them."""
+    episodes, first = [], 0
+    for one in sets:
+        episodes.append(np.unique(one.episode, return_inverse=True)[1] + first)
+        first = int(episodes[-1].max()) + 1
+    parts = (torch.cat(fields) for fields in zip(*(one.transitions for one in sets), strict=True))
+    return TransitionSet(Transitions(*parts), np.concatenate(episodes))
+
+
 def last_episodes(frame: pd.DataFrame, count: int, observation: str) -> TransitionSet:
     """The last whole episodes of every task and target of ``samples.parquet``, about ``count`` transitions in all."""
     sizes = frame.groupby(["task", "target", "episode"], sort=True).size()
@@ -167,13 +178,19 @@ def last_episodes(frame: pd.DataFrame, count: int, observation: str) -> Transiti
     return TransitionSet(as_transitions(frame[labels >= 0], observation), labels[labels >= 0])
 
 
-def _points(name: str, chosen: TransitionSet, truth: RewardFunction, learned: RewardFunction) -> pd.DataFrame:
+def _points(
+    name: str, chosen: TransitionSet, truth: RewardFunction, learned: RewardFunction, discount: float
+) -> pd.DataFrame:
+    columns = nuisance(chosen.transitions, discount)
+    true, own = _numpy(truth, chosen.transitions), _numpy(learned, chosen.transitions)
     return pd.DataFrame(
         {
             "transitions": name,
             "episode": chosen.episode,
-            "truth": _numpy(truth, chosen.transitions),
-            "learned": _numpy(learned, chosen.transitions),
+            "truth": true,
+            "learned": own,
+            "truth_rest": remove(true, columns),
+            "learned_rest": remove(own, columns),
             "task_reward": chosen.transitions.task_reward.double().numpy(),
         }
     )

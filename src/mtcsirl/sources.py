@@ -13,6 +13,7 @@ PACKAGE = Path(__file__).parent
 GLUE = (
     "settings/",
     "errors.py",
+    "extensions.py",
     "storage.py",
     "provenance.py",
     "study.py",

@@ -9,7 +9,9 @@ from typing import ClassVar
 
 from pydantic import BaseModel
 
+from mtcsirl.ablations import changes, prefix
 from mtcsirl.settings import Settings
+from mtcsirl.settings.loading import merge, validate
 from mtcsirl.settings.runs import (
     baseline_run,
     demonstration_run,
@@ -23,6 +25,11 @@ EVALUATION_TARGET = 0
 """Every result is read on target 0; the IRL of several targets or tasks trains on others, so it is new to it."""
 
 
+def varied(settings: Settings, variant: str) -> Settings:
+    """``settings`` with the changes of a variant, as in ``ablation_replay/latest``; the main study has none."""
+    return validate(Settings, merge(settings.model_dump(mode="json"), changes(variant))) if variant else settings
+
+
 @dataclass(frozen=True, order=True)
 class Expert:
     """SAC on r_task + ground-truth cs-reward."""
@@ -32,15 +39,16 @@ class Expert:
     task: str
     target: int
     seed: int
+    variant: str = ""
 
     @property
     def folder(self) -> str:
         """Where the run lands, below the results folder."""
-        return f"expert/{self.cs_reward}/{self.task}-t{self.target}/s{self.seed}"
+        return f"{prefix(self.variant)}expert/{self.cs_reward}/{self.task}-t{self.target}/s{self.seed}"
 
     def settings(self, settings: Settings) -> BaseModel:
         """The slice of ``settings`` that the run depends on."""
-        return expert_run(settings, self.task, self.cs_reward)
+        return expert_run(varied(settings, self.variant), self.task, self.cs_reward)
 
 
 @dataclass(frozen=True, order=True)
@@ -94,6 +102,7 @@ class IrlRun:
     source: str
     seed: int
     members: tuple[tuple[str, int], ...] = field(compare=False)
+    variant: str = ""
 
     @property
     def key(self) -> str:
@@ -103,11 +112,11 @@ class IrlRun:
     @property
     def folder(self) -> str:
         """Where the run lands, below the results folder."""
-        return f"irl/{self.key}/s{self.seed}"
+        return f"{prefix(self.variant)}irl/{self.key}/s{self.seed}"
 
     def settings(self, settings: Settings) -> BaseModel:
         """The slice of ``settings`` that the run depends on."""
-        return irl_run(settings, self.experiment)
+        return irl_run(varied(settings, self.variant), self.experiment)
 
 
 @dataclass(frozen=True, order=True)
@@ -119,11 +128,12 @@ class Transfer:
     task: str
     target: int
     seed: int
+    variant: str = ""
 
     @property
     def folder(self) -> str:
         """Where the run lands, below the results folder."""
-        return f"transfer/{self.irl.key}/{self.task}-t{self.target}/s{self.seed}"
+        return f"{prefix(self.variant)}transfer/{self.irl.key}/{self.task}-t{self.target}/s{self.seed}"
 
     @property
     def learned_task_reward(self) -> bool:
@@ -132,7 +142,7 @@ class Transfer:
 
     def settings(self, settings: Settings) -> BaseModel:
         """The slice of ``settings`` that the run depends on."""
-        return transfer_run(settings, self.task)
+        return transfer_run(varied(settings, self.variant), self.task)
 
 
 @dataclass(frozen=True, order=True)

@@ -70,11 +70,10 @@ def value(scores, **key):
 
 def test_every_set_reward_and_statistic_has_a_row(results):
     scores, points = results
-    assert len(scores) == 4 * 5 * 5
-    assert points.groupby("transitions").size().to_dict() == dict.fromkeys(
-        ["expert", "generator", "sac", "uniform"], 120
-    )
-    assert set(scores["n"]) == {120}
+    assert len(scores) == 5 * 5 * 5
+    within = dict.fromkeys(["expert", "generator", "sac", "uniform"], 120)
+    assert points.groupby("transitions").size().to_dict() == within | {"across": 480}
+    assert scores.groupby("transitions")["n"].max().to_dict() == within | {"across": 480}
 
 
 def test_controls_say_what_they_must(results):

@@ -6,8 +6,10 @@ from pathlib import Path
 
 from snakemake.exceptions import WorkflowError
 
+from mtcsirl.ablations import ABLATIONS
 from mtcsirl.design import ARTEFACTS, design
 from mtcsirl.errors import UserError
+from mtcsirl.extensions import VARIABLE
 from mtcsirl.outputs import OUTPUTS
 from mtcsirl.settings import Settings
 from mtcsirl.settings.loading import validate
@@ -21,15 +23,18 @@ except UserError as error:
     sys.exit(str(error))
 
 STUDY = design(SETTINGS)
-RUNS = {run.folder: run for run in STUDY}
+RUNS = {run.folder: run for name in (None, *ABLATIONS) for run in design(SETTINGS, name)}
 RESULTS = SETTINGS.results
 PACKAGE = Path(os.path.relpath(Path(workflow.basedir) / "src/mtcsirl"))
 # plain `snakemake` of a virtual environment that is not activated finds `mtcsirl` beside itself
 os.environ["PATH"] = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
 
+os.environ[VARIABLE] = os.pathsep.join(SETTINGS.extensions)
+
 
 envvars:
     "PATH",
+    VARIABLE,
 
 
 pathvars:
@@ -40,6 +45,7 @@ pathvars:
 
 
 wildcard_constraints:
+    variant=r"(ablations/\w+/\w+/)?",
     cs_reward="|".join(SETTINGS.cs_rewards),
     method="|".join({*SETTINGS.methods, "mt_csirl"}),
     experiment="single_target|multi_target|multi_task",
@@ -109,5 +115,11 @@ def learned_task_reward(wildcards):
 
 
 def code(*roots):
-    """The modules that ``roots`` (stages or files) consist of; listed as input, an edit reruns the rule."""
-    return [str(PACKAGE / path) for path in sources(*roots)]
+    """The modules that ``roots`` (stages or files) consist of, and extensions; listed as input, an edit reruns the rule."""
+    return [*(str(PACKAGE / path) for path in sources(*roots)), *SETTINGS.extensions]
+
+
+def method_file(method):
+    """The file of a method of the package, listed as a root of its runs; one of an extension is listed anyway."""
+    file = f"irl/methods/{method}.py"
+    return [file] if (PACKAGE / file).is_file() else []

@@ -1,6 +1,6 @@
 """Agents on known rewards: experts (task and common-sense reward) and the plain SAC baseline."""
 
-EXPERT = "expert/{cs_reward}/{task}-t{target}/s{seed}"
+EXPERT = "{variant}expert/{cs_reward}/{task}-t{target}/s{seed}"
 BASELINE = "sac/{task}-t{target}/s{seed}"
 
 

@@ -1,6 +1,6 @@
 """Inverse reinforcement learning, and how well the learned reward agrees with the truth."""
 
-IRL = "irl/{experiment}/{method}/{cs_reward}/{source}/s{seed}"
+IRL = "{variant}irl/{experiment}/{method}/{cs_reward}/{source}/s{seed}"
 SCORE = "scores/{experiment}/{method}/{cs_reward}/{source}/{task}-t{target}/s{seed}"
 
 
@@ -8,7 +8,7 @@ rule learn_reward:
     """Algorithm 1 or 2 over the demonstrations of T (task, target) pairs."""
     input:
         demonstrations=demonstrations_of(IRL),
-        code=lambda wildcards: code("learn_reward", f"irl/methods/{wildcards.method}.py"),
+        code=lambda wildcards: code("learn_reward", *method_file(wildcards.method)),
     output:
         **outputs("learn_reward", IRL),
     log:
@@ -30,8 +30,7 @@ rule learn_reward:
 rule score_reward:
     """Correlation of a learned reward with the ground truth on stated transition sets, with controls."""
     input:
-        reward=multiext(f"<results>/{IRL}/reward", ".json", ".safetensors"),
-        samples=f"<results>/{IRL}/samples.parquet",
+        reward=needed_by(SCORE, "irl", "reward.json", "reward.safetensors", "samples.parquet"),
         expert=needed_by(SCORE, "expert", "policy.json", "policy.safetensors"),
         baseline=needed_by(SCORE, "baseline", "policy.json", "policy.safetensors"),
         code=code("score_reward"),
@@ -55,3 +54,21 @@ rule score_reward:
         " --task {wildcards.task:q} --target {wildcards.target:q} --cs-reward {wildcards.cs_reward:q}"
         " --seed {wildcards.seed:q}"
         " --settings {params.settings:q} --output {params.folder:q} > {log:q} 2>&1"
+
+
+rule reward_quality:
+    """Every scored reward against the truth, over seeds; no part of `all`."""
+    input:
+        scores=[path for run in STUDY.scores for path in files(run, "scores.csv", "points.parquet")],
+        code=code("analysis/reward_quality.py"),
+    output:
+        csv="<results>/scores/reward_quality.csv",
+        markdown="<results>/scores/reward_quality.md",
+    log:
+        "<logs>/scores/reward_quality.log",
+    threads: 1
+    params:
+        settings=as_json(SETTINGS),
+        folder=subpath(output.csv, parent=True),
+    shell:
+        "mtcsirl reward-quality --settings {params.settings:q} --output {params.folder:q} > {log:q} 2>&1"

@@ -1,6 +1,6 @@
 """New agents on learned rewards."""
 
-TRANSFER = "transfer/{experiment}/{method}/{cs_reward}/{source}/{task}-t{target}/s{seed}"
+TRANSFER = "{variant}transfer/{experiment}/{method}/{cs_reward}/{source}/{task}-t{target}/s{seed}"
 
 
 rule transfer:

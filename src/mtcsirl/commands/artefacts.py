@@ -4,6 +4,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from mtcsirl.ablations import ABLATIONS
 from mtcsirl.commands.arguments import Verbs, add_study_settings, add_verb, study_settings
 from mtcsirl.design import ARTEFACTS, design
 from mtcsirl.settings import Settings
@@ -28,12 +29,26 @@ def register(verbs: Verbs) -> None:
         numbered=True,
     )
     _add(verbs, "figure", _figure, does="draw one of the paper's figures", writes="figure_N.pdf, .png", numbered=True)
+    ablation = _add(
+        verbs, "ablation", _ablation, does="draw an ablation", writes="NAME.csv; NAME.pdf, .png into --figures"
+    )
+    ablation.add_argument("name", choices=tuple(ABLATIONS), metavar="NAME", help=", ".join(ABLATIONS))
+    ablation.add_argument("--figures", type=Path, metavar="DIR", help="default: where the DAG puts it")
+    _add(
+        verbs,
+        "reward-quality",
+        _reward_quality,
+        does="hold every learned reward that was scored against the truth, over seeds",
+        writes="reward_quality.csv, .md",
+    )
     _add(verbs, "claims", _claims, does="judge the paper's claims", writes="claims.json, .md, .pdf, .png")
     _add(verbs, "results", _results, does="write verdicts and tables as one Markdown page", writes="results.md")
     _add(verbs, "report", _report, does="make the page that shows everything", writes="index.html")
 
 
-def _add(verbs: Verbs, name: str, run: object, *, does: str, writes: str, numbered: bool = False) -> None:
+def _add(
+    verbs: Verbs, name: str, run: object, *, does: str, writes: str, numbered: bool = False
+) -> argparse.ArgumentParser:
     verb = add_verb(
         verbs,
         name,
@@ -48,6 +63,7 @@ def _add(verbs: Verbs, name: str, run: object, *, does: str, writes: str, number
     verb.add_argument("--partial", action="store_true", help="read what is there and mark what is missing")
     add_study_settings(verb)
     verb.add_argument("--output", type=Path, metavar="DIR", help="default: where the DAG puts it")
+    return verb
 
 
 def _table(parsed: argparse.Namespace) -> None:
@@ -86,6 +102,39 @@ def _figure(parsed: argparse.Namespace) -> None:
     figure, caption = spec.draw(data), spec.caption(data)
     _write_figure((parsed.output or Path(settings.figures)) / name, figure, caption)
     print(f"{spec.title}. {caption}")
+
+
+def _reward_quality(parsed: argparse.Namespace) -> None:
+    from mtcsirl.analysis.reward_quality import quality_markdown, read_quality
+    from mtcsirl.figures.style import scale_notes
+    from mtcsirl.storage import write_csv, write_text
+
+    settings = study_settings(parsed)
+    runs = design(settings).scores
+    if parsed.partial:
+        runs = tuple(run for run in runs if (Path(settings.results) / run.folder / "points.parquet").is_file())
+    rows = read_quality(runs, settings.results, settings.score.bootstrap)
+    folder = parsed.output or Path(settings.results) / "scores"
+    text = quality_markdown(rows, " ".join(scale_notes(settings.scale)))
+    write_csv(folder / "reward_quality.csv", rows)
+    write_text(folder / "reward_quality.md", text)
+    print(text)
+
+
+def _ablation(parsed: argparse.Namespace) -> None:
+    from mtcsirl.analysis.rows import evaluation_rows
+    from mtcsirl.design import variants
+    from mtcsirl.figures.ablation import caption, draw, variant_rows
+    from mtcsirl.storage import write_csv
+
+    settings, name = study_settings(parsed), parsed.name
+    shown = variants(settings, name)
+    frames = {v: evaluation_rows(study, settings.results, partial=parsed.partial) for v, study in shown.items()}
+    rows = variant_rows(frames)
+    write_csv((parsed.output or Path(settings.results) / "ablations") / f"{name}.csv", rows)
+    text = caption(name, rows, settings)
+    _write_figure((parsed.figures or Path(settings.figures)) / name, draw(name, rows, settings), text)
+    print(text)
 
 
 def _write_figure(path: Path, figure: "Figure", caption: str) -> None:

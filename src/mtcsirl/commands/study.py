@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from mtcsirl.ablations import ABLATIONS
 from mtcsirl.commands.arguments import Verbs, add_study_settings, add_verb, study_settings
 from mtcsirl.design import ARTEFACTS, design
 
@@ -74,8 +75,8 @@ def register(verbs: Verbs) -> None:
 
 
 def _artefact(name: str) -> str:
-    if name not in ARTEFACTS:
-        raise argparse.ArgumentTypeError(f"unknown artefact {name!r}; allowed: {', '.join(ARTEFACTS)}")
+    if name not in (*ARTEFACTS, *ABLATIONS):
+        raise argparse.ArgumentTypeError(f"unknown artefact {name!r}; allowed: {', '.join((*ARTEFACTS, *ABLATIONS))}")
     return name
 
 
@@ -102,10 +103,10 @@ def _print_artefacts(settings: "Settings", rates: "Rates") -> None:
     from mtcsirl.plan import plan
 
     lines = []
-    for name in ARTEFACTS:
+    for name in (*ARTEFACTS, *ABLATIONS):
         stages = plan(design(settings, name), settings, rates)
         lines.append((name, sum(s.jobs for s in stages), f"{sum(s.core_hours for s in stages):.1f}"))
-    print("\neach artefact alone (they share runs):")
+    print("\neach artefact alone (they share runs; the total above is without ablations):")
     _print_table(("artefact", "jobs", "core-hours"), lines)
 
 

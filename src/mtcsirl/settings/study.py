@@ -1,10 +1,11 @@
 """The root of the configuration: what the study consists of."""
 
 from collections.abc import Mapping
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, Field, model_validator
 
+from mtcsirl.extensions import load_extensions
 from mtcsirl.irl.methods import METHODS as METHOD_REGISTRY
 from mtcsirl.rewards.ground_truth import COMMON_SENSE_REWARDS
 from mtcsirl.settings.base import Frozen, key
@@ -168,6 +169,14 @@ class TransferStudySettings(TransferSettings):
     )
 
 
+class AblationSettings(Frozen):
+    """Targets ``ablation_*``, which are no part of ``all``; each trains a few agents with one setting changed."""
+
+    tasks: Tasks = key(("reach-wall", "drawer-close"), "tasks, each on its own")
+    cs_reward: CsReward = key("velocity", "common-sense reward")
+    seeds: Seeds = key((0, 1), "seeds of every variant")
+
+
 class Settings(Frozen):
     """The whole configuration; the defaults are the desk scale."""
 
@@ -176,6 +185,7 @@ class Settings(Frozen):
     )
     results: str = key("results", "folder of all runs, tables and the report", min_length=1)
     figures: str = key("paper_figs", "folder of all figures", min_length=1)
+    extensions: tuple[str, ...] = key((), "Python files with methods and common-sense rewards of one's own")
     seeds: Seeds = key(
         (0, 1, 2, 3, 4), "seeds of every reported agent; development uses 100 and up", paper=(0, 1, 2, 3, 4)
     )
@@ -204,3 +214,13 @@ class Settings(Frozen):
     evaluation: EvaluationSettings = key(EvaluationSettings, "final evaluation of every agent")
     gates: GateSettings = key(GateSettings, "what counts as learned")
     progress: ProgressSettings = key(ProgressSettings, "reports, checkpoints, selection")
+    ablations: AblationSettings = key(AblationSettings, "targets ablation_*, no part of all")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _extended(cls, data: Any) -> Any:
+        """What an extension registers can be named in the rest of the configuration."""
+        files = data.get("extensions", ()) if isinstance(data, Mapping) else ()
+        if isinstance(files, list | tuple) and all(isinstance(file, str) for file in files):
+            load_extensions(files)
+        return data
