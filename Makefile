@@ -36,7 +36,8 @@ lint: setup  ## formatting, lint and types, all of which must be clean
 	mypy src
 	snakefmt --check Snakefile workflow
 
-bench: setup  ## measured ratios against stable-baselines3 and stock Meta-World
+bench: setup  ## measured ratios against stable-baselines3, stock Meta-World and imitation
+	sh benchmarks/imitation_environment.sh
 	python -m benchmarks
 
 constraints:  ## renew constraints.txt: the newest versions that pyproject.toml allows

@@ -15,7 +15,7 @@ import matplotlib
 import torch
 from matplotlib.figure import Figure
 
-from benchmarks import agent_steps, environment_steps, sac_updates
+from benchmarks import agent_steps, environment_steps, irl_steps, sac_updates
 from mtcsirl.provenance import commit, machine
 from mtcsirl.storage import atomic, write_json
 
@@ -31,7 +31,7 @@ def main() -> None:
     torch.set_num_threads(1)
     rows: list[dict[str, Any]] = []
     _print("benchmark", "setting", "ours", "theirs", "ratio")
-    for module in (sac_updates, environment_steps, agent_steps):
+    for module in (sac_updates, environment_steps, agent_steps, irl_steps):
         for row in module.measure(rounds=rounds):
             rows.append(row)
             numbers = (f"{row[name]:.4g}" for name in ("ours", "theirs", "ratio"))

@@ -1,0 +1,220 @@
+"""Environment steps per second of MT-CSIRL against plain SAC of the same engine, and against imitation's AIRL.
+
+    python benchmarks/irl_steps.py             the table
+    python benchmarks/irl_steps.py --profile   then, where the time of an iteration goes
+
+An IRL step is one environment step of one generator with all that training pays for it at the desk scale: action,
+replay memory, half a gradient update at minibatch 128 on relabelled samples, 40 discriminator updates of 256 + 256
+transitions per 500 steps, log pi and diagnostics. All take turns of one iteration of 500 steps in one thread, timed in
+CPU seconds of that thread.
+
+Plain SAC trains on the task reward of reach-wall with as many updates, by the same engine: a ratio of 0.8 says that an
+IRL step costs 1.25 times its step. imitation has AIRL on stable-baselines3's SAC with the same numbers, but for the
+gradient penalty, which it lacks. It cannot import Meta-World 3, so there both sides step an environment of random
+numbers that costs nothing. Its environment is made by benchmarks/imitation_environment.sh; without it that row is left
+out.
+"""
+
+import argparse
+import cProfile
+import json
+import os
+import pstats
+import subprocess
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from statistics import median, quantiles
+from time import thread_time
+from typing import Any
+
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+
+import numpy as np
+import torch
+
+from mtcsirl.agents.jobs import AgentJob
+from mtcsirl.agents.lockstep import Outcome
+from mtcsirl.agents.sac import FusedSac
+from mtcsirl.agents.training import Training
+from mtcsirl.demonstrations import collect_demonstrations
+from mtcsirl.irl.methods import METHODS
+from mtcsirl.irl.methods.base import Setup
+from mtcsirl.irl.rollout import World
+from mtcsirl.irl.run import make_trainer
+from mtcsirl.irl.trainer import IrlTrainer
+from mtcsirl.settings import Settings
+from mtcsirl.settings.runs import AgentRunSettings, DemonstrationRunSettings, IrlRunSettings, baseline_run, irl_run
+from mtcsirl.storage import write_parquet
+from mtcsirl.transitions import Transitions
+
+HERE = Path(__file__).parent
+IMITATION = HERE.parent / "build/imitation/bin/python"
+TASK, STEPS, EPISODES = "reach-wall", 500, 20
+
+
+def measure(rounds: int = 5) -> list[dict[str, Any]]:
+    """Return rows {benchmark, setting, ours, theirs, peer, ratio, ...}: steps a second, medians of rounds.
+
+    The ratio is the median of the rounds' ratios; ratio_low and ratio_high are its quartiles over rounds.
+    """
+    torch.set_num_threads(1)
+    turn = _irl_on_meta_world()
+    rows = [_row("mt_csirl, reach-wall", "plain SAC of the same engine", turn, _timed(_plain_sac(rounds)), rounds)]
+    if IMITATION.exists():
+        with _Imitation() as theirs:
+            rows.append(_row("mt_csirl, steps for free", "imitation 1.0.1 AIRL, SB3 2.2.1 SAC", _irl(), theirs, rounds))
+    return rows
+
+
+def _row(setting: str, peer: str, ours: Callable[[], Any], theirs: Callable[[], float], rounds: int) -> dict[str, Any]:
+    own = _timed(ours)
+    for turn in (own, own, theirs, theirs):  # random steps, first updates, a memory that is not empty
+        turn()
+    times = np.array([[own(), theirs()] for _ in range(rounds)])
+    ratios = list(times[:, 1] / times[:, 0])
+    low, _, high = quantiles(ratios, n=4)
+    rates = STEPS / np.median(times, axis=0)
+    return {
+        "benchmark": "irl_steps",
+        "setting": setting,
+        "ours": float(rates[0]),
+        "theirs": float(rates[1]),
+        "peer": peer,
+        "ratio": median(ratios),
+        "ratio_low": low,
+        "ratio_high": high,
+    }
+
+
+def _timed(call: Callable[[], Any]) -> Callable[[], float]:
+    def turn() -> float:
+        started = thread_time()
+        call()
+        return thread_time() - started
+
+    return turn
+
+
+def _settings() -> IrlRunSettings:
+    """The desk scale's, without warm-up so that every iteration has its discriminator updates."""
+    settings = irl_run(Settings(), "single_target")
+    return settings.model_copy(update={"irl": settings.irl.model_copy(update={"warm_up_iterations": 0})})
+
+
+def _irl_on_meta_world() -> Callable[[], None]:
+    settings = _settings()
+    run = DemonstrationRunSettings(episodes=EPISODES, episode_steps=STEPS)
+    policy = FusedSac(1, settings.sac, seeds=[0]).policy(0)
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "demonstrations.parquet"
+        write_parquet(file, collect_demonstrations(policy, TASK, 0, run, seed=0))
+        return make_trainer("mt_csirl", "velocity", [file], 0, settings).iterate
+
+
+def _plain_sac(rounds: int) -> Callable[[], None]:
+    study = Settings(baseline={"steps": {"default": (rounds + 3) * STEPS}}, progress={"select_episodes": 0})
+    settings: AgentRunSettings = baseline_run(study, TASK)
+    settings = settings.model_copy(update={"sac": settings.sac.model_copy(update={"random_steps": STEPS})})
+    return Training([AgentJob(TASK, 0, 0, settings)], log=lambda line: None).episode
+
+
+class _Noise:
+    """One environment whose observations are random numbers."""
+
+    def __init__(self) -> None:
+        self._random = np.random.default_rng(0)
+
+    def reset(self) -> np.ndarray:
+        return self._random.standard_normal((1, 39), dtype=np.float32)
+
+    def step(self, action: np.ndarray) -> Outcome:
+        nothing = np.zeros(1, dtype=bool)
+        return Outcome(self.reset(), np.zeros(1, dtype=np.float32), nothing, nothing)
+
+    def close(self) -> None: ...
+
+
+def _irl() -> Callable[[], None]:
+    settings, random = _settings(), torch.Generator().manual_seed(0)
+    count = EPISODES * STEPS
+    states, following = torch.randn(2, 1, count, 39, generator=random)
+    actions = torch.rand(1, count, 4, generator=random) * 1.9 - 0.95
+    world = World(
+        (("noise", 0),), _Noise(), lambda transitions: transitions.task_reward, lambda *_: {"task_reward": 0.0}
+    )
+    method = METHODS["mt_csirl"](Setup(settings.irl, 1, 0))
+    return IrlTrainer(
+        method, world, Transitions(states, actions, following, torch.zeros(1, count)), settings, 0
+    ).iterate
+
+
+class _Imitation:
+    """The other process: one call is one round of imitation's AIRL, in CPU seconds of its thread."""
+
+    def __enter__(self) -> Callable[[], float]:
+        settings = _settings()
+        irl, sac = settings.irl, settings.sac
+        same = {
+            "learning_rate": sac.policy_learning_rate,
+            "generator_memory": irl.generator_memory,
+            "steps_per_iteration": irl.steps_per_iteration,
+            "generator_updates": irl.generator_updates,
+            "sac_minibatch": sac.minibatch,
+            "temperature": irl.temperature,
+            "sac_hidden_sizes": sac.hidden_sizes,
+            "hidden_sizes": irl.discriminator.hidden_sizes,
+            "minibatch": irl.discriminator.minibatch,
+            "discriminator_updates": irl.discriminator_updates,
+            "discriminator_learning_rate": irl.discriminator.learning_rate,
+            "demonstrations": EPISODES * STEPS,
+            "generator_replay": irl.generator_replay,
+        }
+        command = [str(IMITATION), "-W", "ignore", str(HERE / "imitation_airl.py"), "serve", json.dumps(same)]
+        self._process = subprocess.Popen(
+            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
+        )
+        return self._turn
+
+    def _turn(self) -> float:
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
+        self._process.stdin.write("\n")
+        self._process.stdin.flush()
+        return float(self._process.stdout.readline())
+
+    def __exit__(self, *exception: object) -> None:
+        assert self._process.stdin is not None
+        self._process.stdin.close()
+        self._process.wait()
+
+
+def profile() -> None:
+    """Print the functions of an iteration by the time they spend."""
+    iterate = _irl_on_meta_world()
+    iterate()
+    iterate()
+    recorder = cProfile.Profile(thread_time)
+    recorder.runcall(iterate)
+    pstats.Stats(recorder).sort_stats("cumulative").print_stats("mtcsirl", 30)
+
+
+def main() -> None:
+    """Print the table, on request the profile."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--rounds", type=int, default=5, help="iterations of each (default 5)")
+    parser.add_argument("--profile", action="store_true", help="show where the time of an iteration goes")
+    arguments = parser.parse_args()
+    print(f"{'setting':<28}{'peer':<38}{'ours':>8}{'theirs':>8}{'ratio':>7}{'quartiles':>13}")
+    for row in measure(arguments.rounds):
+        print(
+            f"{row['setting']:<28}{row['peer']:<38}{row['ours']:>8.1f}{row['theirs']:>8.1f}{row['ratio']:>7.2f}"
+            f"{row['ratio_low']:>8.2f}-{row['ratio_high']:.2f}",
+            flush=True,
+        )
+    if arguments.profile:
+        profile()
+
+
+if __name__ == "__main__":
+    main()
