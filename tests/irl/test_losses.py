@@ -91,6 +91,14 @@ def test_bottleneck_information_by_hand_and_by_monte_carlo() -> None:
     assert closed.item() == pytest.approx(estimate.item(), abs=0.01)
 
 
+def test_gradients_of_the_bottlenecks_kl_equal_finite_differences() -> None:
+    mean, log_std = torch.randn(2, 3, 4, dtype=torch.float64), 0.5 * torch.randn(2, 3, 4, dtype=torch.float64)
+    inputs = (mean.requires_grad_(), log_std.requires_grad_())
+    assert torch.autograd.gradcheck(bottleneck_information, inputs)
+    (slope,) = torch.autograd.grad(bottleneck_information(*inputs).sum(), inputs[:1])
+    torch.testing.assert_close(slope, mean.detach())  # d/dmean of mean^2 / 2
+
+
 def test_dual_step_rises_above_the_constraint_falls_below_and_stops_at_zero() -> None:
     beta = torch.tensor(0.3)
     assert dual_step(beta, torch.tensor(2.5), 0.5, 0.1).item() == pytest.approx(0.5)
@@ -147,6 +155,26 @@ def test_gradient_penalty_of_a_network_equals_finite_differences() -> None:
     inputs = torch.randn(1, 32, 8, requires_grad=True)
     ours = gradient_penalty(network.output(inputs).value, inputs).item()
     assert ours == pytest.approx(_penalty(network, inputs.detach().double()), rel=1e-4)
+
+
+@pytest.mark.parametrize("kind", ["perceptron", "bottleneck"])
+def test_gradients_of_the_penalty_in_the_parameters_equal_finite_differences(kind) -> None:
+    """The second derivative, which an update descends."""
+    network = _network(kind)
+    x, random = torch.randn(1, 8, 8, dtype=torch.float64), torch.Generator().manual_seed(5)
+    parameters = network.parameters.detach().double()
+
+    def penalty(values: torch.Tensor) -> torch.Tensor:
+        network.parameters = values
+        inputs = x.clone().requires_grad_()
+        return gradient_penalty(network.output(inputs).value, inputs).sum()
+
+    (gradient,) = torch.autograd.grad(penalty(given := parameters.clone().requires_grad_()), given)
+    for _ in range(5):
+        direction = torch.randn(parameters.shape, generator=random, dtype=torch.float64)
+        with torch.enable_grad():
+            difference = (penalty(parameters + 1e-6 * direction) - penalty(parameters - 1e-6 * direction)) / 2e-6
+        assert (gradient * direction).sum().item() == pytest.approx(difference.item(), rel=1e-4)
 
 
 def test_penalised_loss_adds_weight_times_the_penalty_at_the_experts() -> None:
