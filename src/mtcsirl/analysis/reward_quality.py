@@ -34,7 +34,7 @@ def read_quality(runs: Sequence[Score], results: Path | str, resamples: int) -> 
     points, scores = [], []
     for run in runs:
         irl = run.irl
-        key = {
+        key: dict[str, Any] = {
             "experiment": irl.experiment, "method": irl.method, "cs_reward": irl.cs_reward, "source": irl.source,
             "task": run.task, "seed": irl.seed,
         }  # fmt: skip
@@ -83,9 +83,10 @@ def quality_markdown(rows: pd.DataFrame, note: str = "") -> str:
         "|" + " --- |" * (len(KEY) + 1 + len(names)),
     ]
     for key, group in rows.groupby(KEY, sort=True):
-        cells = group.set_index("statistic")
-        texts = [f"{cells.loc[n, 'value']:.2f} [{cells.loc[n, 'low']:.2f}, {cells.loc[n, 'high']:.2f}]" for n in names]
-        lines.append("| " + " | ".join((*map(str, key), str(group["seeds"].iloc[0]), *texts)) + " |")
+        values = group.set_index("statistic")[["value", "low", "high"]].astype(float)
+        texts = ["{:.2f} [{:.2f}, {:.2f}]".format(*values.loc[name].tolist()) for name in names]
+        named = (str(part) for part in (*key, group["seeds"].iloc[0]))
+        lines.append("| " + " | ".join((*named, *texts)) + " |")
     return "\n".join(lines) + "\n"
 
 
