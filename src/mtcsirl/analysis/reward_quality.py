@@ -83,8 +83,8 @@ def quality_markdown(rows: pd.DataFrame, note: str = "") -> str:
         "|" + " --- |" * (len(KEY) + 1 + len(names)),
     ]
     for key, group in rows.groupby(KEY, sort=True):
-        values = group.set_index("statistic")[["value", "low", "high"]].astype(float)
-        texts = ["{:.2f} [{:.2f}, {:.2f}]".format(*values.loc[name].tolist()) for name in names]
+        by_name = {row["statistic"]: row for row in group.to_dict("records")}
+        texts = [f"{by_name[n]['value']:.2f} [{by_name[n]['low']:.2f}, {by_name[n]['high']:.2f}]" for n in names]
         named = (str(part) for part in (*key, group["seeds"].iloc[0]))
         lines.append("| " + " | ".join((*named, *texts)) + " |")
     return "\n".join(lines) + "\n"

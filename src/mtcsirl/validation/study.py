@@ -45,7 +45,7 @@ DEGREE = 3
 class ValidationSettings:
     """The size of the study; the defaults take minutes on two cores."""
 
-    seeds: tuple[int, ...] = (100, 101)
+    seeds: tuple[int, ...] = (100, 101, 102)
     iterations: int = 60
     warm_up_iterations: int = 10
     episodes: int = 40
