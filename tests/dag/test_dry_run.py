@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 
+from mtcsirl.ablations import ABLATIONS
 from mtcsirl.design import ARTEFACTS, design
 from mtcsirl.settings.loading import load
 from tests.dag.conftest import Snakemake, job_counts
@@ -18,6 +19,11 @@ def dry_run(snakemake: Snakemake, scale: str, *targets: str) -> dict[str, int]:
 @pytest.mark.parametrize("scale", ["desk", "paper"])
 def test_an_artefact_plans_the_jobs_that_the_design_says(snakemake: Snakemake, scale: str, target: str) -> None:
     assert dry_run(snakemake, scale, target) == design(load(scale=scale), target).jobs() | {target: 1}
+
+
+@pytest.mark.parametrize("target", ABLATIONS)
+def test_an_ablation_plans_its_runs_by_the_rules_of_the_main_study(snakemake: Snakemake, target: str) -> None:
+    assert dry_run(snakemake, "desk", target) == design(load(scale="desk"), target).jobs() | {target: 1}
 
 
 @pytest.mark.parametrize("scale", ["smoke", "desk", "paper"])

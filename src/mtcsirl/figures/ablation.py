@@ -39,13 +39,15 @@ def draw(ablation: str, rows: pd.DataFrame, settings: Settings) -> Figure:
     """One row of panels per kind of agent, one column per metric; one mark per seed, a line at the mean."""
     agents = ABLATIONS[ablation].agents
     metrics = (settings.ablations.cs_reward, "success", "task_reward")
-    figure = new_figure(TEXT_WIDTH, 0.5 + 1.5 * len(agents))
+    figure = new_figure(TEXT_WIDTH, 0.5 + 1.8 * len(agents))
     panels = figure.subplots(len(agents), len(metrics), squeeze=False)
     for index, axes in enumerate(panels.flat):
         agent, metric = agents[index // len(metrics)], metrics[index % len(metrics)]
         own = rows[(rows["stage"] == STAGES[agent]) & (rows["metric"] == metric)]
         _draw_panel(axes, ablation, own, settings)
         axes.set_ylabel(quantity_label(metric))
+        if metric == "success":
+            axes.set_ylim(-0.05, 1.05)
         panel_title(axes, index, NAMES[agent])
         if metric == settings.ablations.cs_reward:
             axes.axhline(target_of(metric), color=TARGET_COLOUR, linewidth=0.8, linestyle=":")
