@@ -4,7 +4,7 @@
     python benchmarks/agent_steps.py --profile   then, where the time of our steps goes
 
 An agent step is one environment step with all that training pays for it: the policy's action, the replay memory, half a
-gradient update at minibatch 128 (the desk scale) and, on our side only, relabelling with the expert's velocity reward
+gradient update (the desk scale) and, on our side only, relabelling with the expert's velocity reward
 and the metrics of the learning curve. Both take turns of one episode in one thread, timed in CPU seconds of that
 thread.
 """
@@ -73,7 +73,7 @@ def _settings(rounds: int) -> AgentRunSettings:
         steps=(rounds + 1) * EPISODE_STEPS,
         cs_weight=1.0,
         curriculum=True,
-        sac={"minibatch": 128, "updates_per_step": 0.5, "random_steps": RANDOM_STEPS},
+        sac={"random_steps": RANDOM_STEPS},
     )
 
 

@@ -35,7 +35,7 @@ def test_every_key_has_a_comment_with_unit_and_paper_value() -> None:
         last = name.rpartition(".")[2]
         assert any(line.strip().startswith(f"{last}:") for line in lines)
     text = template()
-    assert "# transitions per gradient step [transitions]; paper: 500\n  minibatch: 128" in text
+    assert "# transitions per gradient step [transitions]; paper: 500\n  minibatch: 64" in text
 
 
 def test_paper_scale_is_the_paper() -> None:
@@ -68,12 +68,12 @@ def test_paper_scale_has_the_published_numbers(checkout: Path) -> None:
 
 def test_deviations_name_key_both_values_and_reason() -> None:
     found = {deviation.key: deviation for deviation in deviations(Settings())}
-    assert found["sac.minibatch"].ours == 128
+    assert found["sac.minibatch"].ours == 64
     assert found["sac.minibatch"].paper == 500
     assert str(found["sac.minibatch"]) == (
-        "sac.minibatch = 128 transitions (paper: 500): transitions per gradient step"
+        "sac.minibatch = 64 transitions (paper: 500): transitions per gradient step"
     )
-    assert "sac.discount" not in found, "equal to the paper's"
+    assert "sac.min_log_std" not in found, "equal to the paper's"
     assert "progress.select_every" not in found, "the paper is silent"
 
 

@@ -32,11 +32,23 @@ def filled_buffer(model: stable_baselines3.SAC, rows: int) -> ReplayBuffer:
 
 @pytest.mark.parametrize("temperature", ["automatic", 0.5])
 def test_same_parameters_after_100_updates(temperature):
-    settings = SacSettings(temperature=temperature, initial_temperature=0.3, minibatch=MINIBATCH)
+    settings = SacSettings(
+        temperature=temperature,
+        initial_temperature=0.3,
+        minibatch=MINIBATCH,
+        policy_learning_rate=3e-4,
+        critic_learning_rate=3e-4,
+        temperature_learning_rate=3e-4,
+        discount=0.99,
+        polyak=5e-3,
+    )
     model = stable_baselines3.SAC(
         "MlpPolicy",
         Spaces(),
         buffer_size=1000,
+        learning_rate=3e-4,
+        gamma=0.99,
+        tau=5e-3,
         ent_coef="auto_0.3" if temperature == "automatic" else temperature,
         policy_kwargs={"net_arch": [256, 256]},
         seed=3,

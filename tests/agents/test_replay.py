@@ -93,6 +93,19 @@ def test_reward_of_every_sampled_row_is_the_mixture_computed_on_that_row():
         torch.testing.assert_close(values[:, row], torch.stack(expected), rtol=1e-4, atol=1e-4)
 
 
+def test_f_counts_only_for_agents_whose_warm_up_is_over():
+    def f(transitions):
+        return transitions.action.sum(-1)
+
+    reward = PolicyReward([RewardMixture(cs_weight=2.0, f=f)] * 2, "cpu")
+    reward.counts[0] = 0.0
+    batch = random_transitions(2, 8)
+    torch.testing.assert_close(reward(batch)[0], batch.task_reward[0])
+    torch.testing.assert_close(reward(batch)[1], batch.task_reward[1] + 2.0 * f(batch)[1])
+    reward.counts.zero_()
+    torch.testing.assert_close(reward(batch), batch.task_reward)
+
+
 def test_reward_shared_by_all_agents_is_computed_in_one_call():
     shapes = []
 

@@ -45,6 +45,8 @@ def test_one_update_follows_the_gradients_of_the_losses():
         policy_learning_rate=1e-3,
         critic_learning_rate=2e-3,
         temperature_learning_rate=3e-3,
+        discount=0.99,
+        polyak=5e-3,
     )
     agents, double = 2, torch.float64
     learner = FusedSac(agents, settings, seeds=[0, 1], dtype=double)

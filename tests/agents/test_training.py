@@ -24,6 +24,12 @@ def with_sac(settings, **changes):
     return settings.model_copy(update={"sac": settings.sac.model_copy(update=changes)})
 
 
+def with_learner(settings, learner):
+    """stable-baselines3 has one learning rate."""
+    same = {"temperature_learning_rate": settings.sac.policy_learning_rate}
+    return with_sac(settings, learner=learner, **(same if learner == "stable_baselines3" else {}))
+
+
 def run(jobs, folder, **options):
     """Train and save; return the bytes of everything written."""
     agents = train_agents(jobs, log=lambda line: None, **options)
@@ -36,7 +42,7 @@ def run(jobs, folder, **options):
 
 @pytest.mark.parametrize("learner", ["fused", "stable_baselines3"])
 def test_training_twice_gives_the_same_bytes(small_run, tmp_path, learner):
-    settings = with_sac(small_run, learner=learner)
+    settings = with_learner(small_run, learner)
     first = run([expert(settings)], tmp_path / "first")
     assert first == run([expert(settings)], tmp_path / "second")
     assert first != run([expert(settings, seed=1)], tmp_path / "other")
@@ -49,7 +55,7 @@ class KilledError(Exception):
 @pytest.mark.parametrize("learner", ["fused", "stable_baselines3"])
 @pytest.mark.parametrize("agents", [1, 2])
 def test_killed_run_resumes_to_the_same_bytes(small_run, tmp_path, learner, agents):
-    settings = with_sac(small_run, learner=learner)
+    settings = with_learner(small_run, learner)
     jobs = [expert(settings, seed) for seed in range(agents)]
     uninterrupted = run(jobs, tmp_path / "uninterrupted")
 
@@ -148,6 +154,39 @@ def test_every_update_is_made_and_none_before_the_random_steps_end(small_run):
     assert made[100] == 0
     assert made[105] == 1
     assert made[300] == 40
+
+
+def test_cs_reward_counts_for_good_once_recent_episodes_succeed(small_run):
+    waiting = small_run.model_copy(update={"warm_up_success": 0.5, "warm_up_episodes": 2, "warm_up_steps": 200})
+    training = Training([expert(waiting), expert(waiting, seed=1)], log=lambda line: None)
+    counts = []
+    for solved in ([True, False], [False, False], [False, False], [False, True]):
+        training._end_warm_up(np.array(solved))
+        counts.append(training._reward.counts.tolist())
+    assert counts == [[0.0, 0.0], [1.0, 0.0], [1.0, 0.0], [1.0, 1.0]]
+    training._reward.counts.zero_()
+    training.step = 200
+    training._end_warm_up(np.array([False, False]))
+    assert training._reward.counts.tolist() == [1.0, 1.0], "at the latest"
+    training.close()
+    at_once = Training([expert(small_run)], log=lambda line: None)
+    assert at_once._reward.counts.tolist() == [1.0]
+    at_once.close()
+
+
+def test_killed_run_remembers_whose_warm_up_is_over(small_run, tmp_path):
+    waiting = small_run.model_copy(update={"warm_up_success": 0.5, "warm_up_episodes": 2, "warm_up_steps": 200})
+    jobs = [expert(waiting), expert(waiting, seed=1)]
+    killed = Training(jobs, checkpoint=tmp_path / "checkpoint", log=lambda line: None)
+    for solved in ([True, False], [True, False], [False, True]):
+        killed._end_warm_up(np.array(solved))
+    killed._save(tmp_path / "checkpoint")
+    resumed = Training(jobs, checkpoint=tmp_path / "checkpoint", log=lambda line: None)
+    resumed._resume(tmp_path / "checkpoint")
+    assert resumed._reward.counts.tolist() == killed._reward.counts.tolist() == [1.0, 1.0]
+    assert resumed._recent == [[True, False], [False, True]]
+    for training in (killed, resumed):
+        training.close()
 
 
 def test_best_policy_of_the_trials_is_kept(small_run, monkeypatch):

@@ -55,8 +55,8 @@ class PolicyReward:
         self.curriculum = Curriculum(agents) if any(mixture.curriculum for mixture in mixtures) else None
         self._f = _group([mixture.f for mixture in mixtures])
         self._task_reward = _group([mixture.task_reward for mixture in mixtures])
-        self.warming_up = False
-        """While set, f does not count: the agents learn their task first."""
+        self.counts = torch.ones(agents, device=device)
+        """[A]; 0 while f does not count for an agent, because it learns its task first."""
 
     @torch.no_grad()
     def __call__(self, transitions: Transitions) -> Tensor:
@@ -64,16 +64,17 @@ class PolicyReward:
         total = transitions.task_reward
         if self._task_reward:
             total = _apply(self._task_reward, transitions, otherwise=total)
-        if self._f and not self.warming_up:
+        if self._f and self.counts.any():
             f = _apply(self._f, transitions, otherwise=torch.zeros_like(total))
             total = total + self._weight() * f
         return self._scale * total
 
     def _weight(self) -> Tensor:
+        weight = self._cs_weight * self.counts[:, None]
         if self.curriculum is None:
-            return self._cs_weight
+            return weight
         alpha = torch.maximum(self._constant, self.curriculum.weight())
-        return self._cs_weight * alpha[:, None].to(self._cs_weight.device)
+        return weight * alpha[:, None].to(weight.device)
 
 
 _Groups = list[tuple[RewardFunction, list[int]]]

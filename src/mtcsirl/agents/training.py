@@ -76,6 +76,9 @@ class Training:
         sampling_seed = int(streams[1].generate_state(1, np.uint32)[0])
         self.replay = Replay(len(jobs), self.settings.steps, seed=sampling_seed, device=self.learner.device)
         self._reward = PolicyReward([job.mixture() for job in jobs], self.learner.device)
+        if self.settings.warm_up_success > 0 and self.settings.warm_up_steps > 0:
+            self._reward.counts.zero_()
+        self._recent: list[list[bool]] = []
         self.step = 0
         self._best: list[tuple[tuple[float, float], Policy] | None] = [None] * len(jobs)
         self._curves: list[list[tuple[int, str, float]]] = [[] for _ in jobs]
@@ -142,6 +145,16 @@ class Training:
             names = {self.jobs[agent].task for agent in np.flatnonzero(outcome.diverged)}
             self._log(f"step {self.step}: the simulation diverged in {', '.join(sorted(names))}")
         self._report(self.step - started, solved)
+        self._end_warm_up(solved)
+
+    def _end_warm_up(self, solved: np.ndarray) -> None:
+        """f counts, for good, for agents whose recent episodes succeeded often enough, and for all at the latest."""
+        if self.step >= self.settings.warm_up_steps:
+            self._reward.counts.fill_(1.0)
+        self._recent = [*self._recent, solved.tolist()][-self.settings.warm_up_episodes :]
+        if len(self._recent) == self.settings.warm_up_episodes:
+            share = torch.tensor(self._recent, dtype=torch.float32).mean(0)
+            self._reward.counts[share >= self.settings.warm_up_success] = 1.0
 
     def _act(self, observation: np.ndarray) -> np.ndarray:
         if self.step < self.settings.sac.random_steps:
@@ -155,7 +168,6 @@ class Training:
         """Catch up with updates_per_step gradient steps per environment step after the random ones."""
         sac = self.settings.sac
         due = int((self.step - sac.random_steps) * sac.updates_per_step)
-        self._reward.warming_up = self.step <= self.settings.warm_up_steps
         while self.learner.updates < due:
             batch = self.replay.sample(sac.minibatch)
             self.learner.update(batch.observation, batch.action, self._reward(batch), batch.next_observation)
@@ -217,6 +229,8 @@ class Training:
             "jobs": [job.fingerprint() for job in self.jobs],
             "step": self.step,
             "random": self._random.bit_generator.state,
+            "recent": self._recent,
+            "counts": self._reward.counts.tolist(),
             "curves": self._curves,
             "scores": [None if best is None else best[0] for best in self._best],
         }
@@ -238,6 +252,8 @@ class Training:
                 weights = without_prefix(f"best/{agent}", tensors)
                 self._best[agent] = (tuple(score), self._policy(agent).with_tensors(weights))
         self.step, self._random.bit_generator.state = notes["step"], notes["random"]
+        self._recent = notes["recent"]
+        self._reward.counts.copy_(torch.tensor(notes["counts"]))
         self._curves = [[(step, name, value) for step, name, value in curve] for curve in notes["curves"]]
         self._log(f"resumed at step {self.step}")
 

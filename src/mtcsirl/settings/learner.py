@@ -27,14 +27,20 @@ class LearnerSettings(Frozen):
     hidden_sizes: tuple[int, ...] = key(
         (256, 256), "hidden layers of actor and critics", unit="units", paper=(256, 256), min_length=1
     )
-    policy_learning_rate: float = key(3.0e-4, "Adam step size of the actor", paper=3.0e-4, gt=0)
-    critic_learning_rate: float = key(3.0e-4, "Adam step size of the critics", paper=3.0e-4, gt=0)
-    temperature_learning_rate: float = key(3.0e-4, "Adam step size of the temperature, where it is automatic", gt=0)
-    discount: float = key(0.99, "discount factor", paper=0.99, ge=0, lt=1)
-    polyak: float = key(5.0e-3, "soft target interpolation", paper=5.0e-3, gt=0, le=1)
+    policy_learning_rate: float = key(1.0e-3, "Adam step size of the actor", paper=3.0e-4, gt=0)
+    critic_learning_rate: float = key(1.0e-3, "Adam step size of the critics", paper=3.0e-4, gt=0)
+    temperature_learning_rate: float = key(
+        3.0e-3,
+        "Adam step size of the temperature, where it is automatic: it has to come down before rewards of 0.01 count",
+        gt=0,
+    )
+    discount: float = key(
+        0.97, "discount factor; with polyak, what decides how soon a distant success is learned", paper=0.99, ge=0, lt=1
+    )
+    polyak: float = key(1.0e-2, "soft target interpolation", paper=5.0e-3, gt=0, le=1)
     min_log_std: float = key(-20.0, "lower clamp of the policy's log standard deviation", paper=-20.0)
     max_log_std: float = key(2.0, "upper clamp of the policy's log standard deviation", paper=2.0)
-    minibatch: int = key(128, "transitions per gradient step", unit="transitions", paper=500, gt=0)
+    minibatch: int = key(64, "transitions per gradient step", unit="transitions", paper=500, gt=0)
     updates_per_step: float = key(0.5, "gradient steps per environment step", paper=1.0, gt=0)
     random_steps: int = key(1000, "uniform random actions before the policy acts", unit="environment steps", ge=0)
     learner: Literal["fused", "stable_baselines3"] = key(
@@ -58,11 +64,11 @@ class RewardScaleSettings(Frozen):
     """What differs between experts, baselines, generators and transfer agents: temperature and reward scale."""
 
     temperature: Temperature = key("automatic", "automatic or a fixed entropy temperature", paper="automatic")
-    initial_temperature: float = key(0.05, "start of the automatic temperature", gt=0)
+    initial_temperature: float = key(0.005, "start of the automatic temperature", gt=0)
     target_entropy: Literal["automatic"] | float = key(
         "automatic", "automatic = minus the action dimension", unit="nats"
     )
-    reward_scale: float = key(1.0, "factor on the whole reward that SAC sees", paper=1.0, gt=0)
+    reward_scale: float = key(0.1, "factor on the whole reward that SAC sees", paper=1.0, gt=0)
 
     def sac(self, learner: LearnerSettings) -> SacSettings:
         """The whole agent: ``learner`` with this temperature and scale."""

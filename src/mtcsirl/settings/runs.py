@@ -29,7 +29,11 @@ class AgentRunSettings(Frozen):
         default=0.0, ge=0, description="weight of the cs-reward (ground truth or learned) beside r_task"
     )
     curriculum: bool = Field(default=False, description="weight the cs-reward by r_ave / R_MAX over 256 steps")
-    warm_up_steps: int = Field(default=0, ge=0, description="environment steps before the cs-reward counts")
+    warm_up_success: float = Field(
+        default=0.0, ge=0, le=1, description="the cs-reward counts from the first time that recent episodes succeed so"
+    )
+    warm_up_episodes: int = Field(default=5, gt=0, description="how many recent episodes these are")
+    warm_up_steps: int = Field(default=0, ge=0, description="the cs-reward counts from here at the latest")
     evaluation: EvaluationSettings = Field(default_factory=EvaluationSettings)
     gates: GateSettings = Field(default_factory=GateSettings)
     progress: ProgressSettings = Field(default_factory=ProgressSettings)
@@ -84,6 +88,8 @@ def expert_run(settings: Settings, task: str, cs_reward: str) -> AgentRunSetting
         steps_for(expert.steps, task),
         cs_weight=expert.cs_weight.get(cs_reward, 1.0),
         curriculum=expert.curriculum,
+        warm_up_success=expert.warm_up_success,
+        warm_up_episodes=expert.warm_up_episodes,
         warm_up_steps=expert.warm_up_steps,
     )
 

@@ -76,6 +76,10 @@ Seed = Annotated[int, Field(ge=0)]
 Seeds = Annotated[tuple[Seed, ...], Field(min_length=1), AfterValidator(_unique)]
 Budget = Annotated[dict[str, Annotated[int, Field(gt=0)]], AfterValidator(_known_budget_keys)]
 """Environment steps: the key ``default`` and one key per task that differs."""
+EXPERT_STEPS = {"default": 40_000, "button-press-topdown-wall": 60_000, "coffee-button": 60_000, "push-back": 120_000}
+AGENT_STEPS = {"default": 30_000, "button-press-topdown-wall": 60_000, "push-back": 120_000}
+PAPER_STEPS = 250_000
+"""500 epochs of 500 steps (Table 5), for every task."""
 
 
 def steps_for(budget: dict[str, int], task: str) -> int:
@@ -115,20 +119,29 @@ class ExpertSettings(RewardScaleSettings):
     """SAC on r_task + weighted ground-truth cs-reward."""
 
     steps: Budget = key(
-        lambda: {"default": 60_000, "push-back": 120_000},
+        lambda: dict(EXPERT_STEPS),
         "training budget per task",
         unit="environment steps",
-        paper={"default": 250_000, "push-back": 250_000},
+        paper=dict.fromkeys(EXPERT_STEPS, PAPER_STEPS),
     )
-    warm_up_steps: int = key(
-        12_000,
-        "steps on r_task alone before the cs-reward counts; without them late-paying tasks learn the behaviour only",
-        unit="environment steps",
+    warm_up_success: float = key(
+        0.6,
+        "r_task alone until this share of the last warm_up_episodes succeeded, or until warm_up_steps; 0 = both from"
+        " the first step. Without it tasks that pay late learn the behaviour and never the task",
+        unit="share",
         paper=0,
+        ge=0,
+        le=1,
+    )
+    warm_up_episodes: int = key(5, "training episodes that warm_up_success looks at", unit="episodes", gt=0)
+    warm_up_steps: int = key(
+        15_000,
+        "the cs-reward counts from here at the latest: it makes agents try what a task alone does not reward",
+        unit="environment steps",
         ge=0,
     )
     cs_weight: dict[CsReward, Annotated[float, Field(gt=0)]] = key(
-        lambda: {"velocity": 20.0, "action_norm": 15.0},
+        lambda: {"velocity": 20.0, "action_norm": 20.0},
         "C_v, C_n: weight of the ground-truth cs-reward beside r_task in [0, 10]",
     )
     curriculum: bool = key(
@@ -140,10 +153,10 @@ class BaselineSettings(RewardScaleSettings):
     """SAC on r_task alone."""
 
     steps: Budget = key(
-        lambda: {"default": 40_000, "push-back": 100_000},
+        lambda: dict(AGENT_STEPS),
         "training budget per task",
         unit="environment steps",
-        paper={"default": 250_000, "push-back": 250_000},
+        paper=dict.fromkeys(AGENT_STEPS, PAPER_STEPS),
     )
 
 
@@ -162,10 +175,10 @@ class TransferStudySettings(TransferSettings):
     """Transfer agents with their budget."""
 
     steps: Budget = key(
-        lambda: {"default": 40_000, "push-back": 100_000},
+        lambda: dict(AGENT_STEPS),
         "training budget per task",
         unit="environment steps",
-        paper={"default": 250_000, "push-back": 250_000},
+        paper=dict.fromkeys(AGENT_STEPS, PAPER_STEPS),
     )
 
 
