@@ -37,19 +37,20 @@ def test_inside_and_outside_the_papers_prediction_interval():
     assert make_cell(rows(far), "velocity", paper).inside is False
     assert make_cell(rows(near), "velocity", Summary(0.73, np.nan, 5)).inside is None
     lines = make_cell(rows(far), "velocity", paper).lines()
-    assert lines == ("0.58±0.02, n=5", "[0.56, 0.60]", "0.73±0.07, outside [0.61, 0.85]")
+    assert lines == ("0.58±0.02, n=5", "[0.56, 0.60]", "0.73±0.07", "outside [0.61, 0.85]")
 
 
 def test_ratio_divides_by_the_target():
     cell = make_cell(rows([[0.72], [0.76]]), "velocity", Summary(0.93, np.nan, 5), scale=0.8)
     assert cell.ours.mean == pytest.approx(0.925)
-    assert cell.lines()[2] == "0.93"
+    assert cell.lines()[2:] == ("0.93", "–")
 
 
 def test_percent_is_printed_as_percent():
     cell = make_cell(rows([[1.0], [0.9]], metric="success"), "success", Summary(0.635, 0.012, 5))
     assert cell.lines(1, 100.0)[0] == "95.0±7.1, n=2"
-    assert cell.lines(1, 100.0)[2].startswith("63.5±1.20, outside [")
+    assert cell.lines(1, 100.0)[2] == "63.5±1.20"
+    assert cell.lines(1, 100.0)[3].startswith("outside [")
 
 
 def test_a_share_stays_between_0_and_1():
@@ -62,7 +63,7 @@ def test_a_share_stays_between_0_and_1():
 def test_spreads_of_the_paper_keep_their_digits():
     """Its 99.9±0.01 % is not 99.9±0.0 %, outside [99.9, 99.9]."""
     cell = make_cell(rows([[1.0]] * 5, metric="success"), "success", Summary(0.999, 0.0001, 5))
-    assert cell.lines(1, 100.0)[2] == "99.9±0.01, outside [99.88, 99.92]"
+    assert cell.lines(1, 100.0)[2:] == ("99.9±0.01", "outside [99.88, 99.92]")
 
 
 def test_missing_doubtful_and_gated_agents_are_marked():
@@ -84,5 +85,5 @@ def test_a_seed_without_one_of_its_tasks_has_no_mean():
 
 def test_nothing_there_is_a_dash_with_its_count():
     cell = make_cell(rows([[np.nan]] * 5, "missing"), "velocity", Summary(0.73, 0.07, 5))
-    assert cell.lines() == ("– ‡5", "–", "0.73±0.07")
+    assert cell.lines() == ("– ‡5", "–", "0.73±0.07", "–")
     assert cell.inside is None

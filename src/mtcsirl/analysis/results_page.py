@@ -6,7 +6,7 @@ from typing import Any
 from mtcsirl.analysis.claims import Finding, claims_markdown
 from mtcsirl.settings import Settings
 from mtcsirl.settings.template import deviations
-from mtcsirl.tables.table import Table, scale_notes
+from mtcsirl.tables.table import DIFFERS, Table, scale_notes
 
 HEAD = """\
 # Results
@@ -40,4 +40,4 @@ def results_page(
 
 def _without_deviations(table: Table) -> str:
     lines = table.markdown().splitlines()
-    return "\n".join(line for line in lines if not line.startswith("- Differs from the paper:")).rstrip()
+    return "\n".join(line for line in lines if not line.startswith(f"- {DIFFERS}")).rstrip()

@@ -8,6 +8,7 @@ from markupsafe import Markup
 
 from mtcsirl.analysis.unit_text import COLUMNS
 from mtcsirl.report.content import FigureView, ReportData
+from mtcsirl.tables.cells import LINES
 
 VERDICTS = {
     "reproduced": "good",
@@ -18,8 +19,6 @@ VERDICTS = {
     "not run": "none",
 }
 """Verdict and its style; the words stand beside the colour."""
-SECONDARY = ("95 % t-interval", "paper")
-"""Labels of the lines that belong to the line above them."""
 CONFIGS = {"smoke": "--configfile config/smoke.yaml ", "paper": "--configfile config/paper.yaml "}
 
 
@@ -40,7 +39,7 @@ def build_report(data: ReportData) -> str:
         css=Markup(_file("page.css")),
         verdict_style=VERDICTS,
         verdict_counts=_verdict_counts(data),
-        secondary=SECONDARY,
+        secondary=LINES[1:],
         unit_columns=COLUMNS,
         command=f"snakemake --cores 2 {CONFIGS.get(data.run.scale, '')}",
     )

@@ -20,6 +20,8 @@ from mtcsirl.analysis.statistics import (
 )
 
 DASH = "–"
+LINES = ("", "95 % t-interval", "paper", "ours in its prediction")
+"""Labels of a cell's lines; the first is that of its row. Prediction: 95 % interval for as many new seeds as ours."""
 PAPER_DIGITS = 2
 RESAMPLES = 500
 MARKS = {"below": "†", "missing": "‡", "doubtful": "§"}
@@ -61,17 +63,20 @@ class Cell:
         """Kinds of doubt in this cell and their counts."""
         return {kind: getattr(self, kind) for kind in MARKS if getattr(self, kind)}
 
-    def lines(self, digits: int = 2, factor: float = 1.0) -> tuple[str, str, str]:
-        """The cell as three texts: ours, its t-interval, the paper's. ``factor`` 100 prints shares as percent.
+    def lines(self, digits: int = 2, factor: float = 1.0) -> tuple[str, str, str, str]:
+        """The cell as the texts of ``LINES``. ``factor`` 100 prints shares as percent.
 
         The paper's spreads keep the two digits that it prints: its smallest, 0.01 %, is not 0.
         """
         marks = "".join(f" {MARKS[kind]}{count}" for kind, count in self.marks.items())
         ours = DASH if self.ours.n == 0 else f"{_spread(self.ours, digits, digits, factor)}, n={self.ours.n}"
-        verdict = {None: "", True: ", inside", False: ", outside"}[self.inside]
-        prediction = f"{verdict} {_bounds(self.prediction, PAPER_DIGITS, factor)}" if verdict else ""
-        paper = _spread(self.paper, digits, PAPER_DIGITS, factor) + prediction
-        return ours + marks, _bounds(self.interval, digits, factor), paper
+        bounds = _bounds(self.prediction, PAPER_DIGITS, factor)
+        return (
+            ours + marks,
+            _bounds(self.interval, digits, factor),
+            _spread(self.paper, digits, PAPER_DIGITS, factor),
+            {None: DASH, True: f"inside {bounds}", False: f"outside {bounds}"}[self.inside],
+        )
 
     def numbers(self) -> dict[str, Any]:
         """The cell as one row of a data frame."""

@@ -8,9 +8,10 @@ import pandas as pd
 
 from mtcsirl.settings import Settings
 from mtcsirl.settings.template import deviations
-from mtcsirl.tables.cells import MARK_TEXTS, Cell
+from mtcsirl.tables.cells import DASH, LINES, MARK_TEXTS, Cell
 
 SMOKE_NOTE = "smoke scale: numbers mean nothing"
+DIFFERS = "Differs from the paper: "
 LATEX = {
     "\\": r"\textbackslash{}",
     "&": r"\&",
@@ -68,6 +69,8 @@ class Table:
     lines: tuple[Line, ...]
     numbers: pd.DataFrame
     notes: tuple[str, ...] = ()
+    differences: tuple[str, ...] = ()
+    """The last notes in few words, for a page of paper: a study has more of them than fit below a table."""
 
     @property
     def title(self) -> str:
@@ -97,12 +100,16 @@ class Table:
             body.append("\\midrule\n" * line.rule + " & ".join([_latex(line.label), *texts]) + r" \\")
         head = " & ".join(_latex(text) for text in [self.corner, *(column.title for column in self.columns)])
         label = self.name.replace("_", ":")
+        notes = [_latex(note) + r"\par" for note in self.notes if not note.startswith(DIFFERS)]
+        if self.differences:
+            text = f"Settings that differ from the paper's, which stand in parentheses: {'; '.join(self.differences)}"
+            notes.append(r"\tiny " + _latex(text) + r"\par")
         return "\n".join(
             [
                 r"\begin{table}[htbp]",
-                r"\centering",
+                r"\centering\footnotesize",
                 rf"\caption{{{_latex(self.caption)}}}\label{{{label}}}",
-                r"\resizebox{\textwidth}{!}{%",
+                r"\resizebox{\ifdim\width>\textwidth\textwidth\else\width\fi}{!}{%",
                 rf"\begin{{tabular}}{{l{'r' * len(self.columns)}}}",
                 r"\toprule",
                 *self._latex_groups(),
@@ -112,7 +119,7 @@ class Table:
                 r"\bottomrule",
                 r"\end{tabular}}",
                 r"\par\medskip\raggedright\scriptsize",
-                *(_latex(note) + r"\par" for note in self.notes),
+                *notes,
                 r"\end{table}",
                 "",
             ]
@@ -140,20 +147,19 @@ class Entry:
     factor: float = 1.0
     strong: bool = False
 
-    def lines(self) -> tuple[str, str, str]:
-        """Ours, interval, paper."""
+    def lines(self) -> tuple[str, ...]:
+        """The texts of ``LINES``."""
         return self.cell.lines(self.digits, self.factor)
 
 
 def entry_lines(label: str, entries: Sequence[Entry], rule: bool = True) -> list[Line]:
-    """The three lines of one row of cells: ours, the t-interval, the paper's."""
-    labels = (label, "95 % t-interval", "paper")
-    texts = zip(*(entry.lines() for entry in entries), strict=True)
+    """The lines of one row of cells: ours, the t-interval, the paper's and, where it predicts any, the prediction."""
+    first, *further = zip(*(entry.lines() for entry in entries), strict=True)
     strong = tuple(i for i, entry in enumerate(entries) if entry.strong)
-    return [
-        Line(name, tuple(text), rule and i == 0, strong if i == 0 else ())
-        for i, (name, text) in enumerate(zip(labels, texts, strict=True))
-    ]
+    if set(further[-1]) == {DASH}:
+        further.pop()
+    lines = [Line(name, tuple(text)) for name, text in zip(LINES[1:], further, strict=False)]
+    return [Line(label, tuple(first), rule, strong), *lines]
 
 
 def result_table(
@@ -165,7 +171,7 @@ def result_table(
     settings: Settings,
     remarks: Sequence[str] = (),
 ) -> Table:
-    """A table of cells: three lines per row, one CSV row per cell, marks explained, scale and deviations below."""
+    """A table of cells: lines per row, one CSV row per cell, marks explained, scale and deviations below."""
     lines = [line for i, (label, entries) in enumerate(rows) for line in entry_lines(label, entries, rule=i > 0)]
     numbers: list[dict[str, Any]] = [
         {"row": label, "column": column.full_title, "metric": entry.metric, **entry.cell.numbers()}
@@ -179,7 +185,7 @@ def result_table(
     lacking = sum(cell.ours.n < cell.expected for cell in cells)
     gaps = [f"incomplete: {lacking} of {len(cells)} cells lack seeds"] if lacking else []
     notes = (*scale_notes(settings), *gaps, *remarks, *marks, *deviation_notes(settings))
-    return Table(name, caption, corner, tuple(columns), tuple(lines), frame, notes)
+    return Table(name, caption, corner, tuple(columns), tuple(lines), frame, notes, differences(settings))
 
 
 def scale_notes(settings: Settings) -> list[str]:
@@ -192,9 +198,13 @@ def scale_notes(settings: Settings) -> list[str]:
 def deviation_notes(settings: Settings) -> list[str]:
     """Every setting that differs from the paper's, one line each."""
     found = [str(deviation) for deviation in deviations(settings)]
-    return ["Differs from the paper: " + text for text in found] or [
-        "All settings that the paper gives are the paper's"
-    ]
+    return [DIFFERS + text for text in found] or ["All settings that the paper gives are the paper's"]
+
+
+def differences(settings: Settings) -> tuple[str, ...]:
+    """The same without what the setting is, as in "sac.discount = 0.9 (0.99)"."""
+    found = deviations(settings)
+    return tuple(str(one).removesuffix(f": {one.text}").replace("(paper: ", "(") for one in found)
 
 
 def _runs(items: Iterable[str]) -> list[tuple[str, int]]:

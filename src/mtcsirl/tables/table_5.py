@@ -7,7 +7,7 @@ import pandas as pd
 from mtcsirl.published import Published, load_published
 from mtcsirl.settings import Settings
 from mtcsirl.tables.cells import DASH
-from mtcsirl.tables.table import Column, Line, Table, deviation_notes, scale_notes
+from mtcsirl.tables.table import Column, Line, Table, deviation_notes, differences, scale_notes
 
 CAPTION = "Hyperparameters of SAC: this study's, the paper's, and whether they are the same."
 REMARKS = (
@@ -29,7 +29,7 @@ def table_5(rows: pd.DataFrame | None, settings: Settings, published: Published 
     ).assign(scale=settings.scale)
     notes = (*scale_notes(settings), *REMARKS, *deviation_notes(settings))
     columns = (Column("ours"), Column("paper"), Column("same"))
-    return Table("table_5", CAPTION, "Description", columns, tuple(lines), frame, notes)
+    return Table("table_5", CAPTION, "Description", columns, tuple(lines), frame, notes, differences(settings))
 
 
 def _entries(settings: Settings, paper: dict[str, Any]) -> list[tuple[str, Any, Any]]:
