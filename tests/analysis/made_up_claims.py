@@ -5,7 +5,7 @@ from functools import cache
 import pandas as pd
 
 from mtcsirl.analysis.claims import judge, load_criteria
-from mtcsirl.analysis.rows import KEY
+from mtcsirl.analysis.rows import KEY, select
 from mtcsirl.design import design
 from mtcsirl.settings import Settings
 from tests.analysis.made_up import evaluation, noise
@@ -57,9 +57,10 @@ def changed(test, result):
 
 
 def with_ablation(rows, means, spread=SPREAD):
-    """Rows with the generators of a study without the curriculum beside them."""
-    own = rows[(rows["stage"] == "learn_reward") & (rows["method"] == "mt_csirl") & (rows["source"] == "all")]
-    own = own.assign(experiment="ablation_curriculum")
+    """Rows with the generators of the ablation without the curriculum beside them."""
+    ablations = SETTINGS.ablations
+    own = select(rows, experiment="single_target", stage="learn_reward", source=ablations.tasks)
+    own = select(own, cs_reward=ablations.cs_reward).assign(experiment="ablation_curriculum")
     keys = own[list(KEY)].to_dict("records")
     jitter = [noise(key, "success", "") for key in keys]
     success = [means(key)["success"] * (1 + spread * x) for key, x in zip(keys, jitter, strict=True)]

@@ -31,6 +31,30 @@ def test_figure_has_a_row_and_a_verdict_per_claim(findings):
     assert len([line for line in drawn if line.get_marker() == "o"]) == len(findings[0].units)
 
 
+def test_figure_shows_each_units_limit_and_the_papers_number(findings):
+    left = {f.name: axes for f, axes in zip(findings, claims_figure(findings, SETTINGS).axes[::2], strict=True)}
+    units = {f.name: f.units for f in findings}
+    for name in ("C1", "C7"):
+        black = [line for line in left[name].lines if line.get_color() == "black"]
+        assert len(black) == len(units[name])
+        triangles = [line.get_xdata()[0] for line in left[name].lines if line.get_marker() == "v"]
+        assert triangles == [unit.paper_value for unit in units[name]]
+    limits = [line.get_xdata()[0] for line in left["C1"].lines if line.get_color() == "black"]
+    assert limits == [0.05] * 4 + [0.15] * 4, "action norm above velocity"
+    assert not [line for line in left["C2"].lines if line.get_marker() == "v"], "the paper prints no number"
+
+
+def test_nothing_of_the_figure_is_cut_off(findings):
+    figure = claims_figure(findings, SETTINGS)
+    figure.canvas.draw()
+    for axes in figure.axes:
+        for text in (*axes.texts, axes.xaxis.label, *axes.get_yticklabels()):
+            box = text.get_window_extent()
+            if text.get_text():
+                assert figure.bbox.x0 - 1 <= box.x0, text
+                assert box.x1 <= figure.bbox.x1 + 1, text
+
+
 def test_figure_of_nothing_and_of_smoke_says_so():
     nothing = judge(rows_of(as_the_paper_says).iloc[:0], scores().iloc[:0], SETTINGS)
     smoke = claims_figure(nothing, SETTINGS.model_copy(update={"scale": "smoke"}))

@@ -7,8 +7,16 @@ import pytest
 
 from mtcsirl import storage
 from mtcsirl.analysis import rows as rows_module
-from mtcsirl.analysis.rows import curve_rows, evaluation_rows, matrix, point_rows, score_rows, select
-from mtcsirl.design import design
+from mtcsirl.analysis.rows import (
+    ablated_generators,
+    curve_rows,
+    evaluation_rows,
+    matrix,
+    point_rows,
+    score_rows,
+    select,
+)
+from mtcsirl.design import design, variants
 from mtcsirl.errors import UserError
 from mtcsirl.settings import Settings
 from tests.analysis.made_up import write_run
@@ -87,6 +95,20 @@ def test_nothing_there_yet_is_a_frame_of_missing_runs(tmp_path):
         assert load(design(SETTINGS), tmp_path, partial=True).empty
         with pytest.raises(UserError, match="is missing"):
             load(design(SETTINGS), tmp_path)
+
+
+def test_generators_of_an_ablation_carry_its_name(tmp_path):
+    """They have the keys of the main study's generators, which they must not be taken for."""
+    study = variants(SETTINGS, "ablation_curriculum")["constant"]
+    missing = ablated_generators(study, tmp_path, "ablation_curriculum")
+    for run in study.irl_runs:
+        write_run(run, tmp_path, means)
+    rows = ablated_generators(study, tmp_path, "ablation_curriculum")
+    assert set(missing["status"]) == {"missing"}
+    assert set(rows["status"]) == {"ok"}
+    assert set(rows["stage"]) == {"learn_reward"}
+    assert set(rows["experiment"]) == {"ablation_curriculum"}
+    assert set(rows["task"]) == set(SETTINGS.ablations.tasks)
 
 
 def test_agent_below_its_gate_counts_and_is_marked(results):

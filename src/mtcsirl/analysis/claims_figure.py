@@ -36,7 +36,7 @@ _GAP = 0.8
 CAPTION = (
     "Verdicts on the paper's claims. Each mark is one judged unit (a cs-reward, or a cs-reward and a task, source or "
     "method): what the claim's criterion looks at, with its 95 % interval; filled circle: criterion met, cross: not "
-    "met, open circle: unclear, open diamond: too few seeds. Black line: the criterion's limit for these units. Grey "
+    "met, open circle: unclear, open diamond: too few seeds. Black line: the criterion's limit for these units. Small "
     "triangle: the paper's number, where it prints one. Units that lack a precondition or a run are not drawn; the "
     "counts below each claim include them."
 )

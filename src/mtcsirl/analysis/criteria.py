@@ -209,15 +209,15 @@ def better_than(evidence: Evidence, rules: Rules) -> Iterator[Unit]:
 
 def suffers_without(evidence: Evidence, rules: Rules) -> Iterator[Unit]:
     """C12: generators trained without the curriculum succeed less often than those trained with it."""
-    settings = evidence.settings
-    for cs in in_paper_order(settings.cs_rewards):
-        run = multi_task(settings, cs, "mt_csirl")
+    cs = evidence.settings.ablations.cs_reward
+    for task in evidence.settings.ablations.tasks:
+        run = single_target(cs, task)
         with_it = evidence.generators(run)
         without = evidence.generators(replace(run, experiment=rules["experiment"]))
         test = welch(with_it.success, without.success)
         parts = [advantage(test, rules["advantage"], "more often successful with the curriculum")]
         value = Estimate(test.difference, test.low, test.high, without.success.n)
-        unit = judged_unit(cs, "train tasks", without, parts, "success lost without the curriculum", value)
+        unit = judged_unit(cs, task, without, parts, "success lost without the curriculum", value)
         yield checked(evidence, against(unit, without, with_it, "with the curriculum"), rules, run, with_it, without)
 
 

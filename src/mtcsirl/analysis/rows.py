@@ -49,6 +49,15 @@ def evaluation_rows(study: Study, results: Path | str, *, partial: bool = False)
     return _mark_equal_seeds(rows[list(ROW_COLUMNS)])
 
 
+def ablated_generators(study: Study, results: Path | str, experiment: str) -> pd.DataFrame:
+    """The generators of a variant, with the name of its ablation as their experiment; runs that are not there: none.
+
+    A variant has the keys of the main study's runs: without a name of their own they would be taken for those.
+    """
+    rows = evaluation_rows(study, results, partial=True)
+    return select(rows, stage="learn_reward").assign(experiment=experiment)
+
+
 def curve_rows(study: Study, results: Path | str, *, partial: bool = False) -> pd.DataFrame:
     """The learning curves of all agents of ``study``, ``CURVE_COLUMNS``; missing runs have no rows."""
     frames = []

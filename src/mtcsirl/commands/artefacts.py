@@ -162,12 +162,17 @@ def _claims(parsed: argparse.Namespace) -> None:
 
 
 def _judged(settings: Settings, partial: bool) -> "list[Finding]":
-    from mtcsirl.analysis.claims import judge
-    from mtcsirl.analysis.rows import evaluation_rows, score_rows
+    import pandas as pd
 
-    study = design(settings)
+    from mtcsirl.analysis.claims import judge
+    from mtcsirl.analysis.rows import ablated_generators, evaluation_rows, score_rows
+    from mtcsirl.design import variants
+
+    study, name = design(settings), "ablation_curriculum"
     rows = evaluation_rows(study, settings.results, partial=partial)
-    return judge(rows, score_rows(study, settings.results, partial=partial), settings)
+    without = ablated_generators(variants(settings, name)["constant"], settings.results, name)
+    scores = score_rows(study, settings.results, partial=partial)
+    return judge(pd.concat([rows, without], ignore_index=True), scores, settings)
 
 
 def _results(parsed: argparse.Namespace) -> None:
