@@ -144,6 +144,7 @@ def rates() -> Rates:
         environment_step={"default": 0.001, "push-back": 0.003},
         action=0.001,
         sac_update={128: 0.01, 256: 0.02},
+        lockstep=1.0,
         discriminator_update={256: 0.004},
         slowdown=1.0,
         base_memory_mib=400,

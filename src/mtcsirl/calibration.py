@@ -1,5 +1,9 @@
-"""Measures the rates of this machine that :mod:`mtcsirl.plan` computes costs from. One thread, about two minutes."""
+"""Measures the rates of this machine that :mod:`mtcsirl.plan` computes costs from. One thread, about two minutes.
 
+CPU seconds, so that what else the machine does shifts them little; it should do little all the same.
+"""
+
+import resource
 import statistics
 import subprocess
 import sys
@@ -23,12 +27,14 @@ from mtcsirl.transitions import Transitions
 MINIBATCHES = (64, 128, 256, 500)
 STEPS = 1000
 UPDATES = 40
+TOGETHER = 6
+"""Generators of the multi-task experiment at desk scale."""
 START = "from mtcsirl import stages; from mtcsirl.environments import make_environment; make_environment('reach', 0)"
-LOAD = "from mtcsirl.calibration import sac_update; import torch; torch.set_num_threads(1); print(sac_update(128))"
+LOAD = "from mtcsirl.calibration import sac_update; import torch; torch.set_num_threads(1); print(sac_update(64))"
 
 
 def calibrate() -> Rates:
-    """All rates of this machine; it should have nothing else to do meanwhile."""
+    """All rates of this machine."""
     torch.set_num_threads(1)
     steps = {task: environment_step(task) for task in dict.fromkeys((*SINGLE_TASKS, *TRAIN_TASKS))}
     found = machine()
@@ -38,6 +44,7 @@ def calibrate() -> Rates:
         environment_step={"default": round(statistics.median(steps.values()), 7), **steps},
         action=_seconds(_acting(), 200),
         sac_update={size: sac_update(size) for size in MINIBATCHES},
+        lockstep=_lockstep(SacSettings().minibatch),
         discriminator_update={size: _discriminator_update(size) for size in MINIBATCHES},
         slowdown=_slowdown(2),
         base_memory_mib=500,
@@ -50,23 +57,27 @@ def environment_step(task: str) -> float:
     """Seconds per step of ``task`` under random actions, resets included."""
     environment = make_environment(task, 0)
     actions = np.random.default_rng(0).uniform(-1, 1, (STEPS, 4)).astype(np.float32)
-    start = time.perf_counter()
+    start = time.thread_time()
     for index, action in enumerate(actions):
         if index % 500 == 0:
             environment.reset()
         environment.step(action)
-    seconds = (time.perf_counter() - start) / STEPS
+    seconds = (time.thread_time() - start) / STEPS
     environment.close()
     return round(seconds, 7)
 
 
-def sac_update(minibatch: int) -> float:
-    """Seconds per gradient step of one agent at the desk scale's network sizes."""
-    sac = FusedSac(1, SacSettings(minibatch=minibatch), seeds=(0,))
-    batch = _transitions(minibatch)
+def sac_update(minibatch: int, agents: int = 1) -> float:
+    """Seconds per gradient step of so many agents together at the desk scale's network sizes."""
+    sac = FusedSac(agents, SacSettings(minibatch=minibatch), seeds=range(agents))
+    batch = _transitions(minibatch, agents)
     return _seconds(
         lambda: sac.update(batch.observation, batch.action, batch.task_reward, batch.next_observation), UPDATES
     )
+
+
+def _lockstep(minibatch: int) -> float:
+    return round(sac_update(minibatch, TOGETHER) / (TOGETHER * sac_update(minibatch)), 2)
 
 
 def _discriminator_update(minibatch: int) -> float:
@@ -83,11 +94,11 @@ def _acting() -> Callable[[], object]:
     return lambda: sac.act(observation).numpy()
 
 
-def _transitions(minibatch: int) -> Transitions:
+def _transitions(minibatch: int, agents: int = 1) -> Transitions:
     random = torch.Generator().manual_seed(0)
-    observation = torch.randn(1, minibatch, 39, generator=random)
-    action = torch.rand(1, minibatch, 4, generator=random) * 1.8 - 0.9
-    return Transitions(observation, action, observation.flip(1), torch.zeros(1, minibatch))
+    observation = torch.randn(agents, minibatch, 39, generator=random)
+    action = torch.rand(agents, minibatch, 4, generator=random) * 1.8 - 0.9
+    return Transitions(observation, action, observation.flip(1), torch.zeros(agents, minibatch))
 
 
 def _seconds(run: Callable[[], object], times: int) -> float:
@@ -96,16 +107,20 @@ def _seconds(run: Callable[[], object], times: int) -> float:
         run()
     taken = []
     for _ in range(times):
-        start = time.perf_counter()
+        start = time.thread_time()
         run()
-        taken.append(time.perf_counter() - start)
+        taken.append(time.thread_time() - start)
     return round(statistics.median(taken), 7)
 
 
 def _start_up() -> float:
-    start = time.perf_counter()
+    def spent() -> float:
+        children = resource.getrusage(resource.RUSAGE_CHILDREN)
+        return children.ru_utime + children.ru_stime
+
+    before = spent()
     subprocess.run([sys.executable, "-c", START], check=True)
-    return round(time.perf_counter() - start, 3)
+    return round(spent() - before, 3)
 
 
 def _slowdown(jobs: int) -> float:

@@ -33,6 +33,8 @@ class Rates(Frozen):
     environment_step: dict[str, float]
     action: float
     sac_update: dict[int, float]
+    lockstep: float
+    """What an agent's gradient step costs among those of several generators, as a share of a lone one's."""
     discriminator_update: dict[int, float]
     slowdown: float
     """Factor on everything when every core is busy."""
@@ -96,7 +98,8 @@ def _agent(own: AgentRunSettings, task: str, rates: Rates) -> Cost:
 def _irl(own: IrlRunSettings, tasks: list[str], rates: Rates) -> Cost:
     irl = own.irl
     rounds = irl.warm_up_iterations + irl.iterations
-    update = irl.generator_updates * rates.update(rates.sac_update, own.sac.minibatch)
+    alone = rates.update(rates.sac_update, own.sac.minibatch)
+    update = irl.generator_updates * alone * (rates.lockstep if len(tasks) > 1 else 1.0)
     discriminate = irl.discriminator_updates * rates.update(rates.discriminator_update, irl.discriminator.minibatch)
     seconds = rates.start_up + len(tasks) * (rounds * update + irl.iterations * discriminate)
     steps = rounds * irl.steps_per_iteration

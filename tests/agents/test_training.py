@@ -190,7 +190,7 @@ def test_killed_run_remembers_whose_warm_up_is_over(small_run, tmp_path):
 
 
 def test_best_policy_of_the_trials_is_kept(small_run, monkeypatch):
-    scores = iter([(0.0, -0.5), (1.0, -0.4), (1.0, -0.9)])
+    scores = iter([(0.0, -0.5, 9.0), (1.0, -0.4, 5.0), (1.0, -0.9, 9.0)])
     monkeypatch.setattr(training_module, "gate_score", lambda job, means: next(scores))
     training = Training([expert(small_run)], log=lambda line: None)
     seen = []
@@ -214,6 +214,8 @@ def test_gate_score_puts_success_first(small_run):
     fast = {"success": 0.5, "velocity": 0.8, "task_reward": 9.0}
     assert gate_score(job, solved) > gate_score(job, fast)
     assert gate_score(job, solved | {"velocity": 0.7}) > gate_score(job, solved)
+    near, nearest = {"velocity": 0.75, "task_reward": 5.0}, {"velocity": 0.8, "task_reward": 4.0}
+    assert gate_score(job, solved | near) > gate_score(job, solved | nearest), "both well inside the gate"
     plain = AgentJob("reach", 1, 0, small_run)
     assert gate_score(plain, solved | {"task_reward": 2.0}) > gate_score(plain, solved)
 

@@ -14,7 +14,7 @@ from mtcsirl import storage
 from mtcsirl.agents.policy import Policy, save_policy
 from mtcsirl.agents.relabelling import RewardMixture
 from mtcsirl.errors import UserError
-from mtcsirl.evaluation import COLUMNS, Row, relative_distance
+from mtcsirl.evaluation import COLUMNS, Row, metric_limit, relative_distance
 from mtcsirl.settings.runs import AgentRunSettings
 from mtcsirl.transitions import RewardFunction
 
@@ -93,8 +93,14 @@ def shared_settings(jobs: Sequence[AgentJob]) -> AgentRunSettings:
     return jobs[0].settings
 
 
-def gate_score(job: AgentJob, means: dict[str, float]) -> tuple[float, float]:
-    """How good a policy looks to its gate: success first, then nearness to the target or, for plain SAC, reward."""
+def gate_score(job: AgentJob, means: dict[str, float]) -> tuple[float, float, float]:
+    """How good a policy looks to its gate: success first, an expert's nearness to the target, then task reward.
+
+    Within half of the gate's limit every distance counts as none: the nearest of many trials would be one that three
+    lucky episodes flatter, not the one that does its task best.
+    """
+    beyond = 0.0
     if job.gate == "expert":
-        return means["success"], -relative_distance(means[job.cs_reward], job.cs_reward)
-    return means["success"], means["task_reward"]
+        limit = metric_limit("expert", job.cs_reward, job.settings.gates)
+        beyond = max(0.0, relative_distance(means[job.cs_reward], job.cs_reward) - limit / 2)
+    return means["success"], -beyond, means["task_reward"]

@@ -80,7 +80,7 @@ class Training:
             self._reward.counts.zero_()
         self._recent: list[list[bool]] = []
         self.step = 0
-        self._best: list[tuple[tuple[float, float], Policy] | None] = [None] * len(jobs)
+        self._best: list[tuple[tuple[float, float, float], Policy] | None] = [None] * len(jobs)
         self._curves: list[list[tuple[int, str, float]]] = [[] for _ in jobs]
         self._checkpoint = None if checkpoint is None else Path(checkpoint)
         tasks = [(job.task, job.target) for job in jobs]

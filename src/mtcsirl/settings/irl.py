@@ -33,9 +33,9 @@ class DiscriminatorSettings(Frozen):
 class IrlSettings(Frozen):
     """Algorithms 1 and 2."""
 
-    iterations: int = key(120, "N: outer iterations after the warm-up", unit="iterations", gt=0)
+    iterations: int = key(80, "N: outer iterations after the warm-up", unit="iterations", gt=0)
     warm_up_iterations: int = key(
-        50,
+        20,
         "iterations on the task reward alone before IRL; methods that do not know it spend them on IRL too",
         unit="iterations",
         paper=0,

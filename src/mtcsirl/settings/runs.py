@@ -86,7 +86,7 @@ def expert_run(settings: Settings, task: str, cs_reward: str) -> AgentRunSetting
         settings,
         expert.sac(settings.sac),
         steps_for(expert.steps, task),
-        cs_weight=expert.cs_weight.get(cs_reward, 1.0),
+        cs_weight=expert.cs_weight.get(cs_reward, 1.0) * expert.cs_weight_factor.get(task, 1.0),
         curriculum=expert.curriculum,
         warm_up_success=expert.warm_up_success,
         warm_up_episodes=expert.warm_up_episodes,
