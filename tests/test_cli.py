@@ -124,7 +124,7 @@ def test_deviations_of_the_paper_scale_are_none(capsys: pytest.CaptureFixture[st
     assert cli.main(["deviations", "--scale", "paper"]) == 0
     assert capsys.readouterr().out == ""
     assert cli.main(["deviations"]) == 0
-    assert "sac.minibatch = 128 transitions (paper: 500)" in capsys.readouterr().out
+    assert "sac.minibatch = 64 transitions (paper: 500)" in capsys.readouterr().out
 
 
 def test_plan_counts_the_jobs_of_the_design(capsys: pytest.CaptureFixture[str]) -> None:

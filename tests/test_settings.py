@@ -70,9 +70,7 @@ def test_deviations_name_key_both_values_and_reason() -> None:
     found = {deviation.key: deviation for deviation in deviations(Settings())}
     assert found["sac.minibatch"].ours == 64
     assert found["sac.minibatch"].paper == 500
-    assert str(found["sac.minibatch"]) == (
-        "sac.minibatch = 64 transitions (paper: 500): transitions per gradient step"
-    )
+    assert str(found["sac.minibatch"]) == ("sac.minibatch = 64 transitions (paper: 500): transitions per gradient step")
     assert "sac.min_log_std" not in found, "equal to the paper's"
     assert "progress.select_every" not in found, "the paper is silent"
 

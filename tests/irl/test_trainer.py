@@ -138,6 +138,29 @@ def _same(first: IrlTrainer, second: IrlTrainer) -> bool:
     return ours.keys() == theirs.keys() and all(torch.equal(ours[name], theirs[name]) for name in ours)
 
 
+def test_warm_up_has_the_temperature_of_plain_sac_and_irl_its_own(demonstrations) -> None:
+    trainer = _trainer("mt_csirl", demonstrations, warm_up_iterations=2, iterations=2)
+    temperatures = []
+    for _ in range(4):
+        trainer.iterate()
+        temperatures.append(trainer.sac.temperature.tolist())
+    assert all(value < 0.1 for value in temperatures[0])
+    assert temperatures[1:] == [[1.0, 1.0]] * 3
+    as_in_irl = _trainer("mt_csirl", demonstrations, warm_up_temperature="as_in_irl")
+    assert as_in_irl.sac.temperature.tolist() == [1.0, 1.0]
+    assert _trainer("mt_airl", demonstrations).sac.temperature.tolist() == [1.0, 1.0], "it knows no task reward"
+
+
+@pytest.mark.parametrize("stop", [1, 2, 3])
+def test_state_restores_before_at_and_after_the_end_of_the_warm_up(demonstrations, stop) -> None:
+    def trainer() -> IrlTrainer:
+        return _trainer("mt_csirl", demonstrations, warm_up_iterations=2, iterations=2)
+
+    whole, stopped, resumed = _run(trainer()), _run(trainer(), stop), trainer()
+    resumed.load_state({name: tensor.clone() for name, tensor in stopped.state().items()})
+    assert _same(_run(resumed, 4 - stop), whole)
+
+
 def test_one_task_printed_order_and_batched_program_are_the_same(demonstrations) -> None:
     one = demonstrations[:1]
     first, second = (_run(_trainer("mt_csirl", one, schedule=s)) for s in ("as_printed", "batched"))
@@ -251,7 +274,8 @@ def test_a_checkpoint_of_other_settings_or_a_broken_one_is_not_taken_up(demonstr
 
 def test_the_reference_learner_trains_too(demonstrations) -> None:
     settings = irl_settings()
-    reference = settings.sac.model_copy(update={"learner": "stable_baselines3"})
+    one_rate = {"temperature_learning_rate": settings.sac.policy_learning_rate}
+    reference = settings.sac.model_copy(update={"learner": "stable_baselines3", **one_rate})
     settings = settings.model_copy(update={"sac": reference})
     trainer = _run(make_trainer("mt_csirl", "velocity", demonstrations, 100, settings))
     assert trainer.method.discriminators["f"].network.parameters.isfinite().all()

@@ -83,6 +83,12 @@ class ReferenceSac:
             model.train(1, observation.shape[1])
         self.updates += 1
 
+    def fix_temperature(self, value: float) -> None:
+        """Hold every model's temperature at `value` from now on."""
+        for model in self.models:
+            model.log_ent_coef = model.ent_coef_optimizer = None
+            model.ent_coef_tensor = torch.tensor(value, device=self.device)
+
     @torch.no_grad()
     def log_prob(self, observation: Tensor, action: Tensor) -> Tensor:
         """log pi(a|s) [A, B], computed as the fused learner does."""

@@ -9,6 +9,7 @@ Source: Haarnoja et al., Soft Actor-Critic Algorithms and Applications, arXiv:18
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -221,6 +222,12 @@ class FusedSac:
                 made = (self.critics if role == "critics" else self.actor).workspace(minibatch)
             self._workspaces[role, minibatch] = made
         return self._workspaces[role, minibatch]
+
+    def fix_temperature(self, value: float) -> None:
+        """Hold every agent's temperature at `value` from now on, automatic or not until here."""
+        self._optimisers.pop("temperature", None)
+        self.log_temperature.fill_(math.log(value))
+        self._programs.clear()
 
     # --- reading and restoring --------------------------------------------------------------------------------
 

@@ -52,5 +52,6 @@ def caption(data: FigureData) -> str:
         f"learned from {', '.join(data.settings.multi_task.train_tasks)}, SAC r_task alone; training episodes of the "
         "stochastic policy. Red line: target. Lines and bands: mean and 95 % t-interval over seeds "
         f"({numbers}); bands are cut off at the frame, curves end where the shortest run does. "
-        f"({chr(ord('a') + len(metrics))}) {scatter_caption(found, _SCATTER)} Scored on {data.settings.multi_task.unseen_tasks[0]}."
+        f"({chr(ord('a') + len(metrics))}) {scatter_caption(found, _SCATTER)} "
+        f"Scored on {data.settings.multi_task.unseen_tasks[0]}."
     )

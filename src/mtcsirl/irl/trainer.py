@@ -22,6 +22,7 @@ from mtcsirl.irl.discriminator import Batch, Discriminator, Method
 from mtcsirl.irl.losses import clamp_log_pi
 from mtcsirl.irl.rollout import World, collect, gather
 from mtcsirl.rewards.networks import RewardNetwork
+from mtcsirl.settings import SacSettings
 from mtcsirl.settings.runs import IrlRunSettings
 from mtcsirl.transitions import Transitions
 
@@ -50,11 +51,12 @@ class IrlTrainer:
         """``demonstrations`` [T, N] are seen as the agent sees them."""
         self.method, self.world, self.settings = method, world, settings
         self.irl = settings.irl
+        self.iteration = 0
         self._demonstrations = demonstrations
         tasks, steps = len(world.members), self.irl.steps_per_iteration
         *seeds, own, replayed = (int(n) for n in np.random.SeedSequence(seed).generate_state(tasks + 2))
         state, action = demonstrations.observation.shape[-1], demonstrations.action.shape[-1]
-        self.sac = make_learner(tasks, settings.sac, seeds, observation_size=state, action_size=action)
+        self.sac = make_learner(tasks, self._first_sac(), seeds, observation_size=state, action_size=action)
         capacity = min(self.irl.generator_memory, self.iterations * steps)
         self.replay = Replay(tasks, capacity, seed=replayed, observation_size=state, action_size=action)
         self.curriculum = Curriculum(tasks, self.irl.curriculum_window)
@@ -64,7 +66,6 @@ class IrlTrainer:
         self._random = torch.Generator().manual_seed(own)
         self._paying: dict[str, RewardNetwork] = {}
         self._centres: dict[str, Tensor] = {}
-        self.iteration = 0
         self.curve: list[Row] = []
         self.diagnostics: list[Row] = []
 
@@ -91,6 +92,24 @@ class IrlTrainer:
             self.sac.update(sample.observation, sample.action, self.policy_reward(sample), sample.next_observation)
         self._note_generators(self.replay.latest(steps), success)
         self.iteration += 1
+        if self.iteration == self.irl.warm_up_iterations:
+            self._fix_temperature()
+
+    def _first_sac(self) -> SacSettings:
+        """The generators' settings as they start: their warm-up may have a temperature of its own."""
+        sac = self.settings.sac
+        if (
+            self.method.knows_task_reward
+            and self.irl.warm_up_iterations
+            and self.irl.warm_up_temperature == "automatic"
+        ):
+            return sac.model_copy(update={"temperature": "automatic"})
+        return sac
+
+    def _fix_temperature(self) -> None:
+        """From the first iteration of IRL on, a fixed temperature is fixed."""
+        if self.settings.sac.temperature != "automatic":
+            self.sac.fix_temperature(float(self.settings.sac.temperature))
 
     # --- generators ---------------------------------------------------------------------------------------------
 
@@ -239,13 +258,15 @@ class IrlTrainer:
     def load_state(self, state: Mapping[str, Tensor]) -> None:
         """Restore what ``state`` gave; the rows in ``curve`` and ``diagnostics`` are the caller's to restore."""
         part = _parts(state)
+        self.iteration = int(part["trainer"]["iteration"])
+        if not self._warming_up:
+            self._fix_temperature()
         self.sac.load_state_dict(part["sac"])
         self.replay.load_state_dict(part["replay"])
         for name, tensor in self.curriculum.state().items():
             tensor.copy_(part["curriculum"][name])
         self._densities.load_state(part.get("densities", {}))
         self._random.set_state(part["trainer"]["random"])
-        self.iteration = int(part["trainer"]["iteration"])
         for name, discriminator in self.method.discriminators.items():
             discriminator.load_state(part[f"discriminator_{name}"])
 

@@ -93,7 +93,12 @@ class IrlSettings(Frozen):
         paper=False,
     )
     temperature: Temperature = key(1.0, "generators: automatic or fixed entropy temperature", paper="automatic")
-    initial_temperature: float = key(1.0, "generators: start of the automatic temperature", gt=0)
+    initial_temperature: float = key(0.05, "generators: start of the automatic temperature", gt=0)
+    warm_up_temperature: Literal["automatic", "as_in_irl"] = key(
+        "automatic",
+        "generators in their warm-up: automatic, as plain SAC, or that of IRL; at temperature 1 the entropy bonus hides"
+        " task rewards below 1, and a task that pays late is not found",
+    )
     discriminator: DiscriminatorSettings = key(DiscriminatorSettings, "the learned reward")
 
     def reward_scale(self) -> RewardScaleSettings:

@@ -76,8 +76,14 @@ Seed = Annotated[int, Field(ge=0)]
 Seeds = Annotated[tuple[Seed, ...], Field(min_length=1), AfterValidator(_unique)]
 Budget = Annotated[dict[str, Annotated[int, Field(gt=0)]], AfterValidator(_known_budget_keys)]
 """Environment steps: the key ``default`` and one key per task that differs."""
-EXPERT_STEPS = {"default": 40_000, "button-press-topdown-wall": 60_000, "coffee-button": 60_000, "push-back": 120_000}
-AGENT_STEPS = {"default": 30_000, "button-press-topdown-wall": 60_000, "push-back": 120_000}
+EXPERT_STEPS = {
+    "default": 40_000,
+    "button-press-topdown-wall": 60_000,
+    "coffee-button": 60_000,
+    "plate-slide": 60_000,
+    "push-back": 80_000,
+}
+AGENT_STEPS = {"default": 30_000, "button-press-topdown-wall": 50_000, "push-back": 60_000}
 PAPER_STEPS = 250_000
 """500 epochs of 500 steps (Table 5), for every task."""
 
@@ -145,7 +151,7 @@ class ExpertSettings(RewardScaleSettings):
         "C_v, C_n: weight of the ground-truth cs-reward beside r_task in [0, 10]",
     )
     cs_weight_factor: dict[Task, Annotated[float, Field(gt=0)]] = key(
-        lambda: {"coffee-button": 2.0},
+        lambda: {"coffee-button": 2.0, "plate-slide": 2.0},
         "factor on cs_weight per task: more where the task pays for staying where it is done",
     )
     curriculum: bool = key(
