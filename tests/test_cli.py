@@ -250,7 +250,9 @@ def test_status_verb_on_an_empty_folder(small: Settings, capsys: pytest.CaptureF
 def test_a_stopped_job_leaves_no_half_written_file(tmp_path: Path, number: int, code: int) -> None:
     run = tmp_path / "run"
     command = [sys.executable, "-m", "mtcsirl.cli", "train-sac", *KEY, "--output", str(run), "--set", "steps=1000000"]
-    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as job:
+    # a shell's background jobs ignore Ctrl-C, and what they start inherits that
+    heeding = {"preexec_fn": lambda: signal.signal(signal.SIGINT, signal.default_int_handler)}
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, **heeding) as job:
         while not (run / ".lock").exists():
             assert job.poll() is None
             time.sleep(0.05)
