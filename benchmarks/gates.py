@@ -22,13 +22,13 @@ import pandas as pd
 import torch
 
 from mtcsirl.agents.jobs import AgentJob
-from mtcsirl.agents.relabelling import ground_truth
 from mtcsirl.agents.training import train_agents
 from mtcsirl.errors import UserError
 from mtcsirl.settings import Settings
 from mtcsirl.settings.loading import load
 from mtcsirl.settings.runs import AgentRunSettings, baseline_run, expert_run
 from mtcsirl.settings.study import DESIGN_TASKS
+from mtcsirl.stages import expert_job
 from mtcsirl.storage import read_json, write_csv, write_json
 from mtcsirl.study import Baseline, Expert
 
@@ -49,8 +49,7 @@ def job(run: Baseline | Expert, settings: Settings) -> AgentJob:
     if isinstance(run, Baseline):
         return AgentJob(run.task, run.target, run.seed, baseline_run(settings, run.task))
     own = expert_run(settings, run.task, run.cs_reward)
-    f = ground_truth(run.cs_reward, own.environment.observation)
-    return AgentJob(run.task, run.target, run.seed, own, run.cs_reward, f=f, gate="expert")
+    return expert_job(own, run.task, run.target, run.cs_reward, run.seed)
 
 
 def train(wanted: Iterable[Baseline | Expert], settings: Settings, output: Path) -> None:

@@ -4,7 +4,7 @@
     python benchmarks/irl_steps.py --profile   then, where the time of an iteration goes
 
 An IRL step is one environment step of one generator with all that training pays for it at the desk scale: action,
-replay memory, half a gradient update at minibatch 128 on relabelled samples, 40 discriminator updates of 256 + 256
+replay memory, half a gradient update on relabelled samples, 40 discriminator updates of 256 + 256
 transitions per 500 steps, log pi and diagnostics. All take turns of one iteration of 500 steps in one thread, timed in
 CPU seconds of that thread.
 

@@ -28,8 +28,13 @@ CHECKPOINT = "checkpoint.safetensors"
 
 def train_expert(settings: AgentRunSettings, task: str, target: int, cs_reward: str, seed: int, output: Path) -> None:
     """Train SAC on r_task + C alpha r_cs and keep the best policy by the expert's gate (appendix B)."""
+    _train(expert_job(settings, task, target, cs_reward, seed), output)
+
+
+def expert_job(settings: AgentRunSettings, task: str, target: int, cs_reward: str, seed: int) -> AgentJob:
+    """The training job of an expert."""
     f = ground_truth(cs_reward, settings.environment.observation)
-    _train(AgentJob(task, target, seed, settings, cs_reward, f=f, gate="expert"), output)
+    return AgentJob(task, target, seed, settings, cs_reward, f=f, gate="expert")
 
 
 def train_sac(settings: AgentRunSettings, task: str, target: int, seed: int, output: Path) -> None:

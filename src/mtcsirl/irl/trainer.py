@@ -98,11 +98,7 @@ class IrlTrainer:
     def _first_sac(self) -> SacSettings:
         """The generators' settings as they start: their warm-up may have a temperature of its own."""
         sac = self.settings.sac
-        if (
-            self.method.knows_task_reward
-            and self.irl.warm_up_iterations
-            and self.irl.warm_up_temperature == "automatic"
-        ):
+        if self._warming_up and self.irl.warm_up_temperature == "automatic":
             return sac.model_copy(update={"temperature": "automatic"})
         return sac
 
