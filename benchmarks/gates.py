@@ -4,16 +4,14 @@
     python -m benchmarks.gates --agents sac --tasks reach push-back    some of them
     python -m benchmarks.gates --print                                 the table of what is there
 
-Agents have the settings of the DAG's jobs (stages ``train_sac`` and ``train_expert``) and train in lockstep, those of
-one kind and budget in one process, at about two thirds of the cost of one job each. An agent's noise comes from a
-stream that it shares with the others, so its numbers are another draw of what the DAG's job with its seed gets. Folders
-below ``--output`` are those of the DAG; what is there is not trained again, and a run that was stopped goes on.
+Agents have the settings of the DAG's jobs (stages ``train_sac`` and ``train_expert``) and train in lockstep, as with
+``mtcsirl train-together``: folders below ``--output`` are those of the DAG, and what is there is not trained again.
 """
 
 import argparse
 import os
 from collections.abc import Iterable, Iterator, Sequence
-from itertools import groupby, product
+from itertools import product
 from pathlib import Path
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")
@@ -21,16 +19,12 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 import pandas as pd
 import torch
 
-from mtcsirl.agents.jobs import AgentJob
-from mtcsirl.agents.training import train_agents
 from mtcsirl.errors import UserError
-from mtcsirl.settings import Settings
 from mtcsirl.settings.loading import load
-from mtcsirl.settings.runs import AgentRunSettings, baseline_run, expert_run
 from mtcsirl.settings.study import DESIGN_TASKS
-from mtcsirl.stages import expert_job
-from mtcsirl.storage import read_json, write_csv, write_json
+from mtcsirl.storage import read_json, write_csv
 from mtcsirl.study import Baseline, Expert
+from mtcsirl.together import train_together
 
 SAC = "sac"
 COLUMNS = ("agent", "task", "target", "seed", "steps", "success", "velocity", "action_norm", "task_reward", "passed")
@@ -42,33 +36,6 @@ def runs(
     """Every combination as a run of the design; an agent is ``sac`` or the cs-reward of an expert."""
     for agent, task, target, seed in product(agents, tasks, targets, seeds):
         yield Baseline(task, target, seed) if agent == SAC else Expert(agent, task, target, seed)
-
-
-def job(run: Baseline | Expert, settings: Settings) -> AgentJob:
-    """The training job of a run, as the stage of the DAG makes it."""
-    if isinstance(run, Baseline):
-        return AgentJob(run.task, run.target, run.seed, baseline_run(settings, run.task))
-    own = expert_run(settings, run.task, run.cs_reward)
-    return expert_job(own, run.task, run.target, run.cs_reward, run.seed)
-
-
-def train(wanted: Iterable[Baseline | Expert], settings: Settings, output: Path) -> None:
-    """Train the agents that are not in ``output`` yet, those of one stage and budget together."""
-
-    def together(run: Baseline | Expert) -> tuple[str, int]:
-        own: AgentRunSettings = run.settings(settings)  # type: ignore[assignment]
-        return run.stage, own.steps
-
-    missing = [run for run in wanted if not (output / run.folder / "settings.json").is_file()]
-    for (stage, steps), group in groupby(sorted(missing, key=together), key=together):
-        batch = list(group)
-        print(f"{stage}: {len(batch)} agents, {steps} steps", flush=True)
-        # named after its first run, so that processes that train other agents beside it keep out of its way
-        checkpoint = output / f"{batch[0].folder.replace('/', '-')}.safetensors"
-        trained = train_agents([job(run, settings) for run in batch], checkpoint=checkpoint)
-        for run, agent in zip(batch, trained, strict=True):
-            agent.save(output / run.folder)
-            write_json(output / run.folder / "settings.json", agent.job.settings.model_dump(mode="json"))
 
 
 def table(wanted: Iterable[Baseline | Expert], output: Path) -> pd.DataFrame:
@@ -109,7 +76,7 @@ def main() -> None:
     wanted = list(runs(arguments.agents, arguments.tasks, arguments.targets, arguments.seeds))
     try:
         if not arguments.print:
-            train(wanted, load(arguments.config), arguments.output)
+            train_together(wanted, load(arguments.config), arguments.output)
     except UserError as error:
         raise SystemExit(str(error)) from error
     found = table(wanted, arguments.output)

@@ -3,26 +3,19 @@
 from benchmarks import gates
 
 from mtcsirl.settings.loading import load
+from mtcsirl.together import train_together
 
 
 def test_agents_train_once_and_are_listed_with_their_gates(tmp_path, capsys):
     settings = load(scale="smoke")
     wanted = list(gates.runs(["sac", "velocity"], ["reach"], [0], [100, 101]))
     assert gates.table(wanted, tmp_path).empty
-    gates.train(wanted, settings, tmp_path)
+    train_together(wanted, settings, tmp_path)
     found = gates.table(wanted, tmp_path)
     assert found[["agent", "seed"]].values.tolist() == [[a, s] for a in ("sac", "velocity") for s in (100, 101)]
     assert found["success"].between(0, 1).all()
     assert found["velocity"].gt(0).all()
     assert not list(tmp_path.glob("*.safetensors")), "no checkpoint is left behind"
     capsys.readouterr()
-    gates.train(wanted, settings, tmp_path)
+    train_together(wanted, settings, tmp_path)
     assert capsys.readouterr().out == "", "what is there is not trained again"
-
-
-def test_jobs_are_those_of_the_stages():
-    settings = load()
-    baseline, expert = gates.runs(["sac", "action_norm"], ["plate-slide"], [2], [100])
-    assert (gates.job(baseline, settings).gate, gates.job(expert, settings).gate) == ("sac", "expert")
-    assert gates.job(expert, settings).settings == expert.settings(settings)
-    assert gates.job(expert, settings).settings.cs_weight == 40.0

@@ -64,25 +64,30 @@ class Stopwatch:
         self._cpu = time.process_time()
         self._spent = spent or {"wall_seconds": 0.0, "cpu_seconds": 0.0}
 
-    def read(self) -> dict[str, float]:
-        """The cost so far, resumed tries included."""
+    def read(self, agents: int = 1) -> dict[str, float]:
+        """The cost so far, resumed tries included; time is shared by ``agents`` runs."""
         peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
         return {
-            "wall_seconds": round(self._spent["wall_seconds"] + time.monotonic() - self._wall, 3),
-            "cpu_seconds": round(self._spent["cpu_seconds"] + time.process_time() - self._cpu, 3),
+            "wall_seconds": round((self._spent["wall_seconds"] + time.monotonic() - self._wall) / agents, 3),
+            "cpu_seconds": round((self._spent["cpu_seconds"] + time.process_time() - self._cpu) / agents, 3),
             "peak_memory_mib": round(peak, 1),
         }
 
 
-def write_provenance(folder: Path | str, stopwatch: Stopwatch, inputs: dict[str, Path] | None = None) -> None:
-    """Write ``provenance.json`` into a run folder: commit, versions, machine, cost, checksums of the inputs."""
+def write_provenance(
+    folder: Path | str, stopwatch: Stopwatch, inputs: dict[str, Path] | None = None, *, agents: int = 1
+) -> None:
+    """Write ``provenance.json`` into a run folder: commit, versions, machine, cost, checksums of the inputs.
+
+    ``agents``: how many runs the process made at once; each bears its share of the time.
+    """
     write_json(
         Path(folder) / "provenance.json",
         {
             "commit": commit(),
             "versions": _versions(),
             "machine": machine(),
-            "cost": stopwatch.read(),
+            "cost": stopwatch.read(agents),
             "inputs": {name: checksum(path) for name, path in sorted((inputs or {}).items())},
         },
     )

@@ -55,12 +55,30 @@ def transfer(
 ) -> None:
     """Train a new agent from scratch on r_task + f with the frozen f in the folder ``reward``.
 
-    ``learned_task_reward``: MT-CSIRL+LT's learned task reward stands in for r_task (Table 4). The policy after the last
-    step is kept: choosing one by the true metric would use what the learned reward has to convey.
+    ``learned_task_reward``: MT-CSIRL+LT's learned task reward stands in for r_task (Table 4).
+    """
+    job = transfer_job(settings, reward, task, target, cs_reward, seed, learned_task_reward=learned_task_reward)
+    _train(job, output, reward_files(reward))
+
+
+def transfer_job(
+    settings: AgentRunSettings,
+    reward: Path,
+    task: str,
+    target: int,
+    cs_reward: str,
+    seed: int,
+    *,
+    learned_task_reward: bool = False,
+) -> AgentJob:
+    """The training job of a transfer agent.
+
+    The policy after the last step is kept: choosing one by the true metric would use what the learned reward has to
+    convey.
     """
     learned = load_learned_reward(reward)
     task_reward = learned.task_reward(task, target) if learned_task_reward else None
-    job = AgentJob(
+    return AgentJob(
         task,
         target,
         seed,
@@ -72,7 +90,11 @@ def transfer(
         keep="last",
         reward_id=storage.checksum(reward / WEIGHTS),
     )
-    _train(job, output, {name: reward / name for name in (WEIGHTS, DESCRIPTION)})
+
+
+def reward_files(reward: Path) -> dict[str, Path]:
+    """What a transfer agent reads of the folder ``reward``."""
+    return {name: reward / name for name in (WEIGHTS, DESCRIPTION)}
 
 
 def collect_demonstrations(

@@ -116,7 +116,8 @@ class IrlRun:
 
     def settings(self, settings: Settings) -> BaseModel:
         """The slice of ``settings`` that the run depends on."""
-        return irl_run(varied(settings, self.variant), self.experiment)
+        tasks = {task for task, _ in self.members}
+        return irl_run(varied(settings, self.variant), self.experiment, tasks)
 
 
 @dataclass(frozen=True, order=True)

@@ -317,3 +317,20 @@ def test_rollouts_reset_every_episode_and_hand_on_every_step() -> None:
     assert [float(observation[0, 0]) for observation, _, _ in seen] == [0, 1, 2, 0, 1]
     assert [float(action[1, 0]) for _, action, _ in seen] == [10, 11, 12, 10, 11]
     assert [float(outcome.next_observation[0, 0]) for _, _, outcome in seen] == [1, 2, 3, 1, 2]
+
+
+def test_scripted_rollouts_belong_to_the_warm_up_and_to_no_discriminator(demonstrations):
+    def made(scripted: int, method: str = "mt_csirl") -> IrlTrainer:
+        settings = irl_settings(warm_up_iterations=3, generator_replay=3, logit_density="mixture")
+        scripted_steps = dict.fromkeys(("coffee-button", "drawer-close", "reach"), scripted)
+        return make_trainer(
+            method, "velocity", demonstrations, 100, settings.model_copy(update={"scripted_steps": scripted_steps})
+        )
+
+    trainer = made(scripted=70)
+    for _ in range(4):
+        trainer.iterate()
+    steps = trainer.irl.steps_per_iteration
+    assert trainer._densities.generator().shape[1] == 2 * steps, "two of four rollouts were scripted"
+    assert made(scripted=10_000)._scripted.steps.max() == 3 * steps, "no longer than the warm-up"
+    assert made(scripted=70, method="mt_airl")._scripted.steps.max() == 0, "it does not know the task"

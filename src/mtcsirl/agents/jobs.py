@@ -75,9 +75,9 @@ class TrainedAgent:
 def shared_settings(jobs: Sequence[AgentJob]) -> AgentRunSettings:
     """The settings of agents that train in lockstep.
 
-    Raises UserError when they differ in more than reward scale, cs_weight or curriculum.
+    Raises UserError when they differ in more than reward scale, cs_weight, curriculum or scripted steps.
     """
-    own: dict[str, Any] = {"cs_weight": 0.0, "curriculum": False}
+    own: dict[str, Any] = {"cs_weight": 0.0, "curriculum": False, "scripted_steps": 0, "scripted_noise": 0.0}
 
     def common(settings: AgentRunSettings) -> AgentRunSettings:
         sac = settings.sac.model_copy(update={"reward_scale": 1.0})
@@ -88,7 +88,7 @@ def shared_settings(jobs: Sequence[AgentJob]) -> AgentRunSettings:
         if common(job.settings) != first:
             raise UserError(
                 f"{job.task}-t{job.target} s{job.seed}: agents in lockstep share all settings but reward_scale, "
-                "cs_weight and curriculum; train it on its own"
+                "cs_weight, curriculum and scripted_steps; train it on its own"
             )
     return jobs[0].settings
 

@@ -24,6 +24,7 @@ from mtcsirl.agents.progress import Progress
 from mtcsirl.agents.relabelling import PolicyReward
 from mtcsirl.agents.replay import Replay
 from mtcsirl.agents.sac import FusedSac
+from mtcsirl.agents.scripted import ScriptedExplorers
 from mtcsirl.environments import ACTION_SIZE, OBSERVATION_SIZE
 from mtcsirl.evaluation import gate_verdict, measure_episode, stochastic_means
 from mtcsirl.settings import SacSettings
@@ -45,7 +46,8 @@ def train_agents(
     checkpoint: file to resume from and to save to; removed at the end. events: folder for TensorBoard event files.
     workers: processes that step the environments and evaluate, 0 for none.
 
-    Raises UserError when the jobs differ in anything but task, target, seed, reward scale, cs_weight or curriculum.
+    Raises UserError when the jobs differ in more than task, target, seed, reward scale, cs_weight, curriculum or
+    scripted steps.
     """
     training = Training(jobs, checkpoint=checkpoint, log=log, events=events, workers=workers)
     try:
@@ -85,6 +87,13 @@ class Training:
         self._checkpoint = None if checkpoint is None else Path(checkpoint)
         tasks = [(job.task, job.target) for job in jobs]
         self.environments: TaskEnvironments = make_environments(tasks, self.settings.environment, workers)
+        self._scripted = ScriptedExplorers(
+            [job.task for job in jobs],
+            seeds,
+            [job.settings.scripted_steps for job in jobs],
+            [job.settings.scripted_noise for job in jobs],
+            self.settings.environment.observation,
+        )
         self._progress = Progress(self.settings.steps, log, events)
         self._log = log
 
@@ -151,15 +160,19 @@ class Training:
         """f counts, for good, for agents whose recent episodes succeeded often enough, and for all at the latest."""
         if self.step >= self.settings.warm_up_steps:
             self._reward.counts.fill_(1.0)
-        self._recent = [*self._recent, solved.tolist()][-self.settings.warm_up_episodes :]
+        own = solved & ~self._scripted.active(max(self.step - 1, 0))
+        self._recent = [*self._recent, own.tolist()][-self.settings.warm_up_episodes :]
         if len(self._recent) == self.settings.warm_up_episodes:
             share = torch.tensor(self._recent, dtype=torch.float32).mean(0)
             self._reward.counts[share >= self.settings.warm_up_success] = 1.0
 
     def _act(self, observation: np.ndarray) -> np.ndarray:
         if self.step < self.settings.sac.random_steps:
-            return self._random.uniform(-1.0, 1.0, (len(self.jobs), ACTION_SIZE)).astype(np.float32)
-        return self._policy_action(observation)
+            action = self._random.uniform(-1.0, 1.0, (len(self.jobs), ACTION_SIZE)).astype(np.float32)
+        else:
+            action = self._policy_action(observation)
+        self._scripted.replace(action, observation, self.step)
+        return action
 
     def _policy_action(self, observation: np.ndarray) -> np.ndarray:
         return self.learner.act(torch.from_numpy(observation).to(self.learner.device)).cpu().numpy()

@@ -102,9 +102,10 @@ def _learn_reward(verbs: Verbs) -> None:
     def run(parsed: argparse.Namespace) -> None:
         from mtcsirl import stages
         from mtcsirl.settings.runs import IrlRunSettings, irl_run
+        from mtcsirl.tasks import TASKS
 
         experiment = "multi_task" if len(parsed.demonstrations) > 1 else "single_target"
-        settings = run_settings(parsed, IrlRunSettings, lambda s: irl_run(s, experiment))
+        settings = run_settings(parsed, IrlRunSettings, lambda s: irl_run(s, experiment, TASKS))
         stages.learn_reward(
             settings, parsed.method, parsed.cs_reward, parsed.demonstrations, parsed.seed, parsed.output
         )

@@ -25,7 +25,7 @@ def register(verbs: Verbs) -> None:
         needs="the rates of this machine, or those that ship with the package (see calibrate)",
         writes="nothing",
     )
-    plan.add_argument("--target", type=_artefact, metavar="NAME", help="one artefact, for example figure_3")
+    plan.add_argument("--target", type=artefact, metavar="NAME", help="one artefact, for example figure_3")
     plan.add_argument("--rates", type=Path, default=None, metavar="FILE", help="what calibrate wrote; default: shipped")
     plan.add_argument("--cores", type=int, default=2, metavar="N", help="cores to spread the jobs over; default 2")
     add_study_settings(plan)
@@ -38,7 +38,7 @@ def register(verbs: Verbs) -> None:
         needs="the study's results folder, finished or not",
         writes="nothing",
     )
-    status.add_argument("--target", type=_artefact, metavar="NAME", help="one artefact, for example figure_3")
+    status.add_argument("--target", type=artefact, metavar="NAME", help="one artefact, for example figure_3")
     status.add_argument("--cores", type=int, default=2, metavar="N", help="cores for the time left; default 2")
     add_study_settings(status)
 
@@ -74,7 +74,8 @@ def register(verbs: Verbs) -> None:
     calibrate.add_argument("--output", type=Path, required=True, metavar="FILE", help="a JSON file")
 
 
-def _artefact(name: str) -> str:
+def artefact(name: str) -> str:
+    """An artefact or ablation of the design."""
     if name not in (*ARTEFACTS, *ABLATIONS):
         raise argparse.ArgumentTypeError(f"unknown artefact {name!r}; allowed: {', '.join((*ARTEFACTS, *ABLATIONS))}")
     return name

@@ -1,6 +1,6 @@
 """Algorithms 1 and 2: generators and discriminators in turn, T tasks in one process."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import torch
@@ -8,6 +8,7 @@ from torch import Tensor
 
 from mtcsirl.agents.lockstep import Outcome
 from mtcsirl.agents.replay import Replay
+from mtcsirl.agents.scripted import ScriptedExplorers
 from mtcsirl.agents.training import make_learner
 from mtcsirl.irl.curriculum import Curriculum
 from mtcsirl.irl.densities import Densities
@@ -63,6 +64,7 @@ class IrlTrainer:
         mixed = self.irl.generator_replay if self.irl.logit_density == "mixture" else 1
         self._densities = Densities(demonstrations, settings.sac, policies=mixed, steps=steps)
         self._policies_mixed = mixed
+        self._scripted = self._explorers(seeds)
         self._random = torch.Generator().manual_seed(own)
         self._paying: dict[str, RewardNetwork] = {}
         self._centres: dict[str, Tensor] = {}
@@ -83,7 +85,8 @@ class IrlTrainer:
         steps, episode = self.irl.steps_per_iteration, self.settings.evaluation.episode_steps
         random = self._acts_randomly
         success = collect(self.world.environments, self._act, steps, episode, self._on_step)
-        if not self._warming_up or self.iteration + self._policies_mixed > self.irl.warm_up_iterations:
+        wanted = not self._warming_up or self.iteration + self._policies_mixed > self.irl.warm_up_iterations
+        if wanted and self.iteration >= self._scripted_rollouts:
             self._tabulate(random)
         if not self._warming_up:
             self._note_discriminators(self._update_discriminators())
@@ -107,6 +110,20 @@ class IrlTrainer:
         if self.settings.sac.temperature != "automatic":
             self.sac.fix_temperature(float(self.settings.sac.temperature))
 
+    def _explorers(self, seeds: Sequence[int]) -> ScriptedExplorers:
+        """Scripted first actions belong to a warm-up: they are knowledge of the task."""
+        tasks = [task for task, _ in self.world.members]
+        warm_up = self.irl.warm_up_iterations * self.irl.steps_per_iteration
+        most = min(warm_up, self.replay.capacity) if self.method.knows_task_reward else 0
+        steps = [min(most, self.settings.scripted_steps.get(task, 0)) for task in tasks]
+        noise = [self.settings.scripted_noise] * len(tasks)
+        return ScriptedExplorers(tasks, seeds, steps, noise, self.settings.environment.observation)
+
+    @property
+    def _scripted_rollouts(self) -> int:
+        """How many of the first rollouts hold scripted actions of any generator."""
+        return -(-int(self._scripted.steps.max()) // self.irl.steps_per_iteration)
+
     # --- generators ---------------------------------------------------------------------------------------------
 
     @property
@@ -116,8 +133,11 @@ class IrlTrainer:
     def _act(self, observation: np.ndarray) -> np.ndarray:
         if self._acts_randomly:
             shape = (len(observation), self._demonstrations.action.shape[-1])
-            return (2.0 * torch.rand(shape, generator=self._random) - 1.0).numpy()
-        return self.sac.act(torch.from_numpy(observation).float()).numpy()
+            action = (2.0 * torch.rand(shape, generator=self._random) - 1.0).numpy()
+        else:
+            action = self.sac.act(torch.from_numpy(observation).float()).numpy()
+        self._scripted.replace(action, observation, self.replay.size)
+        return action
 
     def _on_step(self, observation: np.ndarray, action: np.ndarray, outcome: Outcome) -> None:
         self.replay.add(observation, action, outcome.next_observation, outcome.task_reward)
@@ -178,8 +198,9 @@ class IrlTrainer:
         return paying, float(torch.stack(norms).mean())
 
     def _window(self) -> Transitions:
-        """The generators' transitions [T, n] that discriminators see: whole rollouts, the newest one last."""
-        wanted = self.irl.generator_replay * self.irl.steps_per_iteration
+        """The generators' transitions [T, n] that discriminators see: whole rollouts of their own, the newest last."""
+        own = self.iteration + 1 - self._scripted_rollouts
+        wanted = min(own, self.irl.generator_replay) * self.irl.steps_per_iteration
         return self.replay.latest(min(wanted, self.replay.size))
 
     def _tabulate(self, random: bool) -> None:

@@ -3,6 +3,7 @@
 A job's ``settings.json`` is exactly this, so a changed key reruns the jobs that read it and no others.
 """
 
+from collections.abc import Collection
 from typing import Any
 
 from pydantic import Field
@@ -34,6 +35,8 @@ class AgentRunSettings(Frozen):
     )
     warm_up_episodes: int = Field(default=5, gt=0, description="how many recent episodes these are")
     warm_up_steps: int = Field(default=0, ge=0, description="the cs-reward counts from here at the latest")
+    scripted_steps: int = Field(default=0, ge=0, description="first actions, those of Meta-World's hand-written policy")
+    scripted_noise: float = Field(default=0.0, ge=0, description="standard deviation of the noise on them")
     evaluation: EvaluationSettings = Field(default_factory=EvaluationSettings)
     gates: GateSettings = Field(default_factory=GateSettings)
     progress: ProgressSettings = Field(default_factory=ProgressSettings)
@@ -53,6 +56,8 @@ class IrlRunSettings(Frozen):
     environment: EnvironmentSettings = Field(default_factory=EnvironmentSettings)
     sac: SacSettings = Field(default_factory=SacSettings)
     irl: IrlSettings = Field(default_factory=IrlSettings)
+    scripted_steps: dict[str, int] = Field(default_factory=dict, description="as of an agent, by task")
+    scripted_noise: float = Field(default=0.0, ge=0, description="as of an agent")
     demonstration_episodes: int = Field(default=20, gt=0, description="episodes of each expert that are read")
     evaluation: EvaluationSettings = Field(default_factory=EvaluationSettings)
     gates: GateSettings = Field(default_factory=GateSettings)
@@ -67,16 +72,22 @@ class ScoreRunSettings(Frozen):
     discount: float = Field(default=0.99, ge=0, lt=1)
 
 
-def _agent(settings: Settings, sac: SacSettings, steps: int, **extra: Any) -> AgentRunSettings:
+def _agent(settings: Settings, sac: SacSettings, task: str, budget: dict[str, int], **extra: Any) -> AgentRunSettings:
     return AgentRunSettings(
         environment=settings.environment,
         sac=sac,
-        steps=steps,
+        steps=steps_for(budget, task),
+        **_scripted(settings, task),
         evaluation=settings.evaluation,
         gates=settings.gates,
         progress=settings.progress,
         **extra,
     )
+
+
+def _scripted(settings: Settings, task: str) -> dict[str, Any]:
+    steps = settings.exploration.scripted_steps.get(task, 0)
+    return {"scripted_steps": steps, "scripted_noise": settings.exploration.scripted_noise if steps else 0.0}
 
 
 def expert_run(settings: Settings, task: str, cs_reward: str) -> AgentRunSettings:
@@ -85,18 +96,19 @@ def expert_run(settings: Settings, task: str, cs_reward: str) -> AgentRunSetting
     return _agent(
         settings,
         expert.sac(settings.sac),
-        steps_for(expert.steps, task),
+        task,
+        expert.steps,
         cs_weight=expert.cs_weight.get(cs_reward, 1.0) * expert.cs_weight_factor.get(task, 1.0),
         curriculum=expert.curriculum,
         warm_up_success=expert.warm_up_success,
         warm_up_episodes=expert.warm_up_episodes,
-        warm_up_steps=expert.warm_up_steps,
+        warm_up_steps=steps_for(expert.warm_up_steps, task),
     )
 
 
 def baseline_run(settings: Settings, task: str) -> AgentRunSettings:
     """The settings of plain SAC on ``task``."""
-    return _agent(settings, settings.baseline.sac(settings.sac), steps_for(settings.baseline.steps, task))
+    return _agent(settings, settings.baseline.sac(settings.sac), task, settings.baseline.steps)
 
 
 def transfer_run(settings: Settings, task: str) -> AgentRunSettings:
@@ -105,7 +117,8 @@ def transfer_run(settings: Settings, task: str) -> AgentRunSettings:
     return _agent(
         settings,
         transfer.sac(settings.sac),
-        steps_for(transfer.steps, task),
+        task,
+        transfer.steps,
         cs_weight=transfer.cs_weight,
         curriculum=transfer.curriculum,
     )
@@ -119,12 +132,15 @@ def demonstration_run(settings: Settings, experiments: tuple[str, ...] = ("multi
     )
 
 
-def irl_run(settings: Settings, experiment: str) -> IrlRunSettings:
-    """The settings of one IRL run of ``experiment``."""
+def irl_run(settings: Settings, experiment: str, tasks: Collection[str]) -> IrlRunSettings:
+    """The settings of one IRL run of ``experiment`` on ``tasks``."""
+    scripted = {task: steps for task, steps in settings.exploration.scripted_steps.items() if task in tasks and steps}
     return IrlRunSettings(
         environment=settings.environment,
         sac=settings.irl.reward_scale().sac(settings.sac),
         irl=settings.irl,
+        scripted_steps=scripted,
+        scripted_noise=settings.exploration.scripted_noise if scripted else 0.0,
         demonstration_episodes=settings.demonstrations.episodes[experiment],  # type: ignore[index]
         evaluation=settings.evaluation,
         gates=settings.gates,

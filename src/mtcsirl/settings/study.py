@@ -83,7 +83,7 @@ EXPERT_STEPS = {
     "plate-slide": 60_000,
     "push-back": 80_000,
 }
-AGENT_STEPS = {"default": 30_000, "button-press-topdown-wall": 50_000, "push-back": 60_000}
+AGENT_STEPS = {"default": 30_000, "button-press-topdown-wall": 30_000, "push-back": 60_000}
 PAPER_STEPS = 250_000
 """500 epochs of 500 steps (Table 5), for every task."""
 
@@ -91,6 +91,19 @@ PAPER_STEPS = 250_000
 def steps_for(budget: dict[str, int], task: str) -> int:
     """The number of environment steps that ``budget`` grants to ``task``."""
     return budget.get(task, budget["default"])
+
+
+class ExplorationSettings(Frozen):
+    """First actions of agents on tasks whose reward random actions never meet."""
+
+    scripted_steps: dict[Task, Annotated[int, Field(ge=0)]] = key(
+        lambda: {"push-back": 10_000, "button-press-topdown-wall": 5_000},
+        "every agent on these tasks begins with so many steps of Meta-World's hand-written policy, and learns from them"
+        " as from its own; generators that do not know r_task do not",
+        unit="environment steps",
+        paper={"push-back": 0, "button-press-topdown-wall": 0},
+    )
+    scripted_noise: float = key(0.3, "standard deviation of the noise on its actions", ge=0)
 
 
 class SingleTargetSettings(Frozen):
@@ -140,11 +153,10 @@ class ExpertSettings(RewardScaleSettings):
         le=1,
     )
     warm_up_episodes: int = key(5, "training episodes that warm_up_success looks at", unit="episodes", gt=0)
-    warm_up_steps: int = key(
-        15_000,
+    warm_up_steps: Budget = key(
+        lambda: {"default": 15_000, "button-press-topdown-wall": 30_000, "push-back": 60_000},
         "the cs-reward counts from here at the latest: it makes agents try what a task alone does not reward",
         unit="environment steps",
-        ge=0,
     )
     cs_weight: dict[CsReward, Annotated[float, Field(gt=0)]] = key(
         lambda: {"velocity": 20.0, "action_norm": 20.0},
@@ -228,6 +240,7 @@ class Settings(Frozen):
     multi_task: MultiTaskSettings = key(MultiTaskSettings, "sections 5.3 and 5.4")
     environment: EnvironmentSettings = key(EnvironmentSettings, "observation and targets")
     sac: LearnerSettings = key(LearnerSettings, "what all agents share")
+    exploration: ExplorationSettings = key(ExplorationSettings, "first actions")
     expert: ExpertSettings = key(ExpertSettings, "experts")
     baseline: BaselineSettings = key(BaselineSettings, "plain SAC")
     demonstrations: DemonstrationSettings = key(DemonstrationSettings, "demonstrations")

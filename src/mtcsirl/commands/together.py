@@ -1,0 +1,35 @@
+"""The verb that trains the agents of a study in lockstep."""
+
+import argparse
+from pathlib import Path
+
+from mtcsirl.commands.arguments import Verbs, add_study_settings, add_verb, natural, study_settings
+from mtcsirl.commands.study import artefact
+
+AGENT_STAGES = ("train_sac", "train_expert", "transfer")
+
+
+def register(verbs: Verbs) -> None:
+    """Add the verb."""
+    verb = add_verb(
+        verbs,
+        "train-together",
+        _run,
+        does="train the missing agents of a study or of one artefact in lockstep, many in one process",
+        needs="for transfer agents their learned rewards; agents whose reward is missing are left alone",
+        writes="what train-sac, train-expert and transfer write, into the study's results folder",
+    )
+    verb.add_argument("--target", type=artefact, metavar="NAME", help="one artefact, for example figure_3")
+    verb.add_argument("--stages", nargs="+", choices=AGENT_STAGES, default=AGENT_STAGES, help="default: all three")
+    verb.add_argument("--most", type=natural, default=16, metavar="N", help="agents in one batch; default 16")
+    add_study_settings(verb)
+
+
+def _run(parsed: argparse.Namespace) -> None:
+    from mtcsirl.design import design
+    from mtcsirl.together import train_together
+
+    settings = study_settings(parsed)
+    runs = [run for run in design(settings, parsed.target) if run.stage in parsed.stages]
+    trained = train_together(runs, settings, Path(settings.results), most=max(1, parsed.most))
+    print(f"{trained} agents trained")
