@@ -15,12 +15,12 @@ import matplotlib
 import torch
 from matplotlib.figure import Figure
 
-from benchmarks import agent_steps, environment_steps, irl_steps, sac_updates
+from benchmarks import agent_steps, environment_steps, irl_steps, jobs, sac_updates
+from benchmarks.sides import print_rows
 from mtcsirl.provenance import commit, machine
 from mtcsirl.storage import atomic, write_json
 
 FOLDER = Path(__file__).parent
-WIDTHS = (20, 34, 12, 12, 8)
 
 
 def main() -> None:
@@ -29,20 +29,11 @@ def main() -> None:
     parser.add_argument("--rounds", type=int, default=7, help="turns of each side (default 7)")
     rounds = parser.parse_args().rounds
     torch.set_num_threads(1)
-    rows: list[dict[str, Any]] = []
-    _print("benchmark", "setting", "ours", "theirs", "ratio")
-    for module in (sac_updates, environment_steps, agent_steps, irl_steps):
-        for row in module.measure(rounds=rounds):
-            rows.append(row)
-            numbers = (f"{row[name]:.4g}" for name in ("ours", "theirs", "ratio"))
-            _print(str(row["benchmark"]), str(row["setting"]), *numbers)
+    modules = (sac_updates, environment_steps, agent_steps, irl_steps, jobs)
+    rows = print_rows(row for module in modules for row in module.measure(rounds))
     write_json(FOLDER / "results.json", {"commit": commit(), "machine": machine(), "rows": rows})
     with atomic(FOLDER / "results.png", "wb") as handle:
         plot(rows).savefig(handle, format="png", dpi=150)
-
-
-def _print(*cells: str) -> None:
-    print("  ".join(cell.ljust(width) for cell, width in zip(cells, WIDTHS, strict=True)), flush=True)
 
 
 def plot(rows: list[dict[str, Any]]) -> Figure:

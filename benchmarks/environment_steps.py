@@ -1,8 +1,8 @@
 """Environment steps per second against stock Meta-World, on every task of the design.
 
-    python benchmarks/environment_steps.py              the table
-    python benchmarks/environment_steps.py --identity   first, 10 random episodes a task, compared bit for bit
-    python benchmarks/environment_steps.py --profile    then, where the time of a step goes
+    python -m benchmarks.environment_steps              the table
+    python -m benchmarks.environment_steps --identity   first, 10 random episodes a task, compared bit for bit
+    python -m benchmarks.environment_steps --profile    then, where the time of a step goes
 
 Ours is the environment that agents train in: float32 and mapped observations, divergence read. Stock is Meta-World's
 own class with its target fixed and nothing around it. Both take the same random actions in turns of 100 steps, in one
@@ -11,9 +11,9 @@ thread, and what counts is the processor time of that thread: whatever else the 
 
 import argparse
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from functools import partial
 from importlib.metadata import version
-from statistics import median
 from time import thread_time
 from typing import Any
 
@@ -21,6 +21,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 import numpy as np
 
+from benchmarks.sides import Row, print_rows, row, seconds
 from mtcsirl.environments import EPISODE_STEPS, make_environment
 from mtcsirl.fast_metaworld.identity import first_difference, stock_environment
 from mtcsirl.settings.study import DESIGN_TASKS
@@ -28,49 +29,32 @@ from mtcsirl.settings.study import DESIGN_TASKS
 TURN_STEPS = 100
 
 
-def measure(tasks: tuple[str, ...] = DESIGN_TASKS, rounds: int = 7) -> list[dict[str, Any]]:
-    """Return rows {benchmark, setting, ours, theirs, peer, ratio}: steps (and resets) a second, medians of rounds.
-
-    A round is one episode. The ratio is the median of the rounds' ratios, not the ratio of the medians.
-    """
+def measure(rounds: int = 7, tasks: tuple[str, ...] = DESIGN_TASKS) -> Iterator[Row]:
+    """Rows of steps and of resets a second, two per task; a round is one episode."""
     peer = f"metaworld {version('metaworld')}"
-    rows = []
     for task in tasks:
         ours, theirs = make_environment(task, 0), stock_environment(task, 0)
         _round(ours, theirs, 0)  # warm up
         times = np.array([_round(ours, theirs, seed) for seed in range(1, rounds + 1)])  # [rounds, ours|theirs, kind]
-        for kind, (benchmark, count) in enumerate(
-            {"environment_steps": EPISODE_STEPS, "environment_resets": 1}.items()
-        ):
-            ratio = median(times[:, 1, kind] / times[:, 0, kind])
-            rates = count / np.median(times[:, :, kind], axis=0)
-            rows.append(
-                dict(benchmark=benchmark, setting=task, ours=rates[0], theirs=rates[1], peer=peer, ratio=float(ratio))
-            )
-    return rows
+        yield row("environment_steps", task, peer, times[:, :, 0], EPISODE_STEPS)
+        yield row("environment_resets", task, peer, times[:, :, 1])
 
 
 def _round(ours: Any, theirs: Any, seed: int) -> list[tuple[float, float]]:
     """Return the seconds of stepping and of resetting for both environments, over one episode in turns."""
     environments = (ours, theirs)
     actions = np.random.default_rng(seed).uniform(-1, 1, (EPISODE_STEPS, 4)).astype(np.float32)
-    resets = [_seconds(environment.reset) for environment in environments]
+    resets = [seconds(environment.reset) for environment in environments]
     steps = [0.0, 0.0]
     for start in range(0, EPISODE_STEPS, TURN_STEPS):
         for i, environment in enumerate(environments):
-            steps[i] += _seconds(_play, environment, actions[start : start + TURN_STEPS])
+            steps[i] += seconds(partial(_play, environment, actions[start : start + TURN_STEPS]))
     return list(zip(steps, resets, strict=True))
 
 
 def _play(environment: Any, actions: np.ndarray) -> None:
     for action in actions:
         environment.step(action)
-
-
-def _seconds(function: Callable[..., Any], *arguments: Any) -> float:
-    start = thread_time()
-    function(*arguments)
-    return thread_time() - start
 
 
 def profile(task: str, episodes: int = 5) -> dict[str, float]:
@@ -84,27 +68,27 @@ def profile(task: str, episodes: int = 5) -> dict[str, float]:
         "reward": (simulator, "evaluate_state"),
         "map": (environment, "_seen"),
     }
-    seconds = dict.fromkeys(parts, 0.0)
+    spent = dict.fromkeys(parts, 0.0)
     for part, (owner, method) in parts.items():
-        setattr(owner, method, _timed(getattr(owner, method), part, seconds))
+        setattr(owner, method, _timed(getattr(owner, method), part, spent))
     total = 0.0
     for seed in range(episodes):
         environment.reset()
         if seed == 0:
-            seconds.update(dict.fromkeys(seconds, 0.0))  # the first reset simulates and observes
+            spent.update(dict.fromkeys(spent, 0.0))  # the first reset simulates and observes
         actions = np.random.default_rng(seed).uniform(-1, 1, (EPISODE_STEPS, 4)).astype(np.float32)
-        total += _seconds(_play, environment, actions)
-    micros = {name: 1e6 * value / (episodes * EPISODE_STEPS) for name, value in ({"step": total} | seconds).items()}
+        total += seconds(partial(_play, environment, actions))
+    micros = {name: 1e6 * value / (episodes * EPISODE_STEPS) for name, value in ({"step": total} | spent).items()}
     return micros | {"rest": micros["step"] - sum(micros[part] for part in parts)}
 
 
-def _timed(function: Callable[..., Any], part: str, seconds: dict[str, float]) -> Callable[..., Any]:
-    """Return the function, adding its time to ``seconds[part]``."""
+def _timed(function: Callable[..., Any], part: str, spent: dict[str, float]) -> Callable[..., Any]:
+    """Return the function, adding its time to ``spent[part]``."""
 
     def timed(*arguments: Any) -> Any:
         start = thread_time()
         result = function(*arguments)
-        seconds[part] += thread_time() - start
+        spent[part] += thread_time() - start
         return result
 
     return timed
@@ -121,9 +105,7 @@ def main() -> None:
         for task in DESIGN_TASKS:
             difference = first_difference(task, 0, episodes=10)
             print(f"{task:28}{difference or '10 random episodes identical'}", flush=True)
-    print(f"{'benchmark':20}{'task':28}{'ours/s':>9}{'stock/s':>9}{'ratio':>8}")
-    for row in measure(rounds=arguments.rounds):
-        print("{benchmark:20}{setting:28}{ours:9.0f}{theirs:9.0f}{ratio:8.2f}".format(**row))
+    print_rows(measure(arguments.rounds))
     if arguments.profile:
         for task in DESIGN_TASKS:
             parts = profile(task)

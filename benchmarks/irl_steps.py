@@ -1,7 +1,7 @@
 """Environment steps per second of MT-CSIRL against plain SAC of the same engine, and against imitation's AIRL.
 
-    python benchmarks/irl_steps.py             the table
-    python benchmarks/irl_steps.py --profile   then, where the time of an iteration goes
+    python -m benchmarks.irl_steps             the table
+    python -m benchmarks.irl_steps --profile   then, where the time of an iteration goes
 
 An IRL step is one environment step of one generator with all that training pays for it at the desk scale: action,
 replay memory, half a gradient update on relabelled samples, 40 discriminator updates of 256 + 256
@@ -15,16 +15,14 @@ numbers that costs nothing. Its environment is made by benchmarks/imitation_envi
 out.
 """
 
-import argparse
 import cProfile
 import json
 import os
 import pstats
 import subprocess
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
-from statistics import median, quantiles
 from time import thread_time
 from typing import Any
 
@@ -33,6 +31,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 import numpy as np
 import torch
 
+from benchmarks.sides import Row, command, row, seconds
 from mtcsirl.agents.jobs import AgentJob
 from mtcsirl.agents.lockstep import Outcome
 from mtcsirl.agents.sac import FusedSac
@@ -53,47 +52,24 @@ IMITATION = HERE.parent / "build/imitation/bin/python"
 TASK, STEPS, EPISODES = "reach-wall", 500, 20
 
 
-def measure(rounds: int = 5) -> list[dict[str, Any]]:
-    """Return rows {benchmark, setting, ours, theirs, peer, ratio, ...}: steps a second, medians of rounds.
-
-    The ratio is the median of the rounds' ratios; ratio_low and ratio_high are its quartiles over rounds.
-    """
-    torch.set_num_threads(1)
+def measure(rounds: int = 5) -> Iterator[Row]:
+    """Rows of environment steps a second against plain SAC and, where its environment is made, imitation."""
     turn = _irl_on_meta_world()
-    rows = [_row("mt_csirl, reach-wall", "plain SAC of the same engine", turn, _timed(_plain_sac(rounds)), rounds)]
+    yield _row("mt_csirl, reach-wall", "plain SAC of the same engine", turn, _timed(_plain_sac(rounds)), rounds)
     if IMITATION.exists():
         with _Imitation() as theirs:
-            rows.append(_row("mt_csirl, steps for free", "imitation 1.0.1 AIRL, SB3 2.2.1 SAC", _irl(), theirs, rounds))
-    return rows
+            yield _row("mt_csirl, steps for free", "imitation 1.0.1 AIRL, SB3 2.2.1 SAC", _irl(), theirs, rounds)
 
 
-def _row(setting: str, peer: str, ours: Callable[[], Any], theirs: Callable[[], float], rounds: int) -> dict[str, Any]:
+def _row(setting: str, peer: str, ours: Callable[[], Any], theirs: Callable[[], float], rounds: int) -> Row:
     own = _timed(ours)
     for turn in (own, own, theirs, theirs):  # random steps, first updates, a memory that is not empty
         turn()
-    times = np.array([[own(), theirs()] for _ in range(rounds)])
-    ratios = list(times[:, 1] / times[:, 0])
-    low, _, high = quantiles(ratios, n=4)
-    rates = STEPS / np.median(times, axis=0)
-    return {
-        "benchmark": "irl_steps",
-        "setting": setting,
-        "ours": float(rates[0]),
-        "theirs": float(rates[1]),
-        "peer": peer,
-        "ratio": median(ratios),
-        "ratio_low": low,
-        "ratio_high": high,
-    }
+    return row("irl_steps", setting, peer, [[own(), theirs()] for _ in range(rounds)], STEPS)
 
 
 def _timed(call: Callable[[], Any]) -> Callable[[], float]:
-    def turn() -> float:
-        started = thread_time()
-        call()
-        return thread_time() - started
-
-    return turn
+    return lambda: seconds(call)
 
 
 def _settings() -> IrlRunSettings:
@@ -199,22 +175,5 @@ def profile() -> None:
     pstats.Stats(recorder).sort_stats("cumulative").print_stats("mtcsirl", 30)
 
 
-def main() -> None:
-    """Print the table, on request the profile."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--rounds", type=int, default=5, help="iterations of each (default 5)")
-    parser.add_argument("--profile", action="store_true", help="show where the time of an iteration goes")
-    arguments = parser.parse_args()
-    print(f"{'setting':<28}{'peer':<38}{'ours':>8}{'theirs':>8}{'ratio':>7}{'quartiles':>13}")
-    for row in measure(arguments.rounds):
-        print(
-            f"{row['setting']:<28}{row['peer']:<38}{row['ours']:>8.1f}{row['theirs']:>8.1f}{row['ratio']:>7.2f}"
-            f"{row['ratio_low']:>8.2f}-{row['ratio_high']:.2f}",
-            flush=True,
-        )
-    if arguments.profile:
-        profile()
-
-
 if __name__ == "__main__":
-    main()
+    command(__doc__, measure, profile)

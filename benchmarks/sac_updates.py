@@ -1,7 +1,7 @@
 """SAC gradient updates per second against stock stable-baselines3, at four minibatch sizes.
 
-    python benchmarks/sac_updates.py             the table
-    python benchmarks/sac_updates.py --profile   then, where the time of an update goes
+    python -m benchmarks.sac_updates             the table
+    python -m benchmarks.sac_updates --profile   then, where the time of an update goes
 
 Both learners have the networks of the paper (Table 5) and sample their own replay memory of 10,000 transitions, so an
 update is what a training run pays for one. They take turns in one thread, timed in CPU seconds of that thread, so that
@@ -9,14 +9,10 @@ whatever else the machine does slows both alike. The share of the GEMM peak is t
 multiplications, over that of one large matrix product timed in the same turns.
 """
 
-import argparse
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from importlib.metadata import version
 from itertools import pairwise
-from statistics import median, quantiles
-from time import thread_time
-from typing import Any
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
@@ -26,6 +22,7 @@ import torch
 from stable_baselines3 import SAC
 from stable_baselines3.common.logger import Logger
 
+from benchmarks.sides import Row, command, row, seconds
 from mtcsirl.agents.replay import Replay
 from mtcsirl.agents.sac import FusedSac
 from mtcsirl.settings import SacSettings
@@ -44,38 +41,16 @@ class Spaces(gymnasium.Env[np.ndarray, np.ndarray]):
     action_space = gymnasium.spaces.Box(-1.0, 1.0, (ACTION,), np.float32)
 
 
-def measure(minibatches: tuple[int, ...] = MINIBATCHES, rounds: int = 9) -> list[dict[str, Any]]:
-    """Return rows {benchmark, setting, ours, theirs, peer, ratio, ...}: updates a second, medians of rounds.
-
-    The ratio is the median of the rounds' ratios; ratio_low and ratio_high are its quartiles over rounds.
-    """
-    torch.set_num_threads(1)
+def measure(rounds: int = 9, minibatches: tuple[int, ...] = MINIBATCHES) -> Iterator[Row]:
+    """Rows of updates a second, one per minibatch, with ``gemm_share``."""
     peer = f"stable-baselines3 {version('stable-baselines3')}"
-    rows = []
     for minibatch in minibatches:
         turns = (_ours(minibatch), _theirs(minibatch), _gemm())
-        counts = [max(1, round(TURN_SECONDS / _seconds(turn, 3))) for turn in turns]
-        times = np.array(
-            [[_seconds(turn, count) for turn, count in zip(turns, counts, strict=True)] for _ in range(rounds)]
-        )
-        ratios = list(times[:, 1] / times[:, 0])
-        low, _, high = quantiles(ratios, n=4)
-        rate = update_flops(minibatch) / times[:, 0]
-        peak = 2 * GEMM**3 / times[:, 2]
-        rows.append(
-            {
-                "benchmark": "sac_updates",
-                "setting": f"minibatch {minibatch}",
-                "ours": 1 / float(np.median(times[:, 0])),
-                "theirs": 1 / float(np.median(times[:, 1])),
-                "peer": peer,
-                "ratio": median(ratios),
-                "ratio_low": low,
-                "ratio_high": high,
-                "gemm_share": float(np.median(rate / peak)),
-            }
-        )
-    return rows
+        counts = [max(1, round(TURN_SECONDS / seconds(turn, 3))) for turn in turns]
+        times = np.array([[seconds(*turn) for turn in zip(turns, counts, strict=True)] for _ in range(rounds)])
+        rate, peak = update_flops(minibatch) / times[:, 0], 2 * GEMM**3 / times[:, 2]
+        found = row("sac_updates", f"minibatch {minibatch}", peer, times[:, :2])
+        yield found | {"gemm_share": float(np.median(rate / peak))}
 
 
 def update_flops(minibatch: int, hidden: tuple[int, ...] = (256, 256)) -> float:
@@ -131,42 +106,16 @@ def _gemm() -> Callable[[], None]:
     return lambda: torch.mm(left, right, out=out)
 
 
-def _seconds(call: Callable[[], Any], count: int) -> float:
-    """CPU seconds of this thread for one call, the mean of `count`."""
-    started = thread_time()
-    for _ in range(count):
-        call()
-    return (thread_time() - started) / count
-
-
-def profile(minibatch: int, updates: int = 100) -> str:
-    """The operators of our update by the time they spend themselves."""
+def profile(minibatch: int = 128, updates: int = 100) -> None:
+    """Print the operators of our update by the time they spend themselves."""
     update = _ours(minibatch)
     update()
     with torch.profiler.profile(record_shapes=True) as record:
         for _ in range(updates):
             update()
     events = record.key_averages(group_by_input_shape=True)
-    return str(events.table(sort_by="self_cpu_time_total", row_limit=15, max_shapes_column_width=60))
-
-
-def main() -> None:
-    """Print the table, on request the profile."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--rounds", type=int, default=9, help="turns of each learner (default 9)")
-    parser.add_argument("--profile", action="store_true", help="show where the time of an update goes")
-    arguments = parser.parse_args()
-    print(f"{'minibatch':>10}{'ours':>8}{'theirs':>8}{'ratio':>7}{'quartiles':>13}{'GEMM peak':>11}")
-    for minibatch in MINIBATCHES:
-        (row,) = measure((minibatch,), arguments.rounds)
-        print(
-            f"{minibatch:>10}{row['ours']:>8.1f}{row['theirs']:>8.1f}{row['ratio']:>7.2f}"
-            f"{row['ratio_low']:>8.2f}-{row['ratio_high']:.2f}{row['gemm_share']:>10.0%}",
-            flush=True,
-        )
-    if arguments.profile:
-        print(profile(128))
+    print(events.table(sort_by="self_cpu_time_total", row_limit=15, max_shapes_column_width=60))
 
 
 if __name__ == "__main__":
-    main()
+    command(__doc__, measure, profile)

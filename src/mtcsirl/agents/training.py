@@ -200,15 +200,25 @@ class Training:
         self._progress.report(self.step, measured)
 
     def _try_policies(self) -> None:
-        """Run the stochastic policies for some episodes, outside of the memory, and keep the best of each agent."""
+        """Keep the best policy of each agent, by trial episodes outside of the memory and by the last training ones."""
         if all(job.keep == "last" for job in self.jobs):
             return
         trials = [self._trial() for _ in range(self.settings.progress.select_episodes)]
         for agent, job in enumerate(self.jobs):
-            means = {name: float(np.mean([t[agent][name] for t in trials])) for name in trials[0][agent]}
+            episodes = [trial[agent] for trial in trials] + self._training_episodes(agent)
+            means = {name: float(np.mean([one[name] for one in episodes])) for name in trials[0][agent]}
             score, best = gate_score(job, means), self._best[agent]
             if best is None or score >= best[0]:
                 self._best[agent] = (score, self._policy(agent))
+
+    def _training_episodes(self, agent: int) -> list[dict[str, float]]:
+        """The metrics of the last training episodes that the agent's own policy acted in."""
+        episodes: dict[int, dict[str, float]] = {}
+        for step, name, value in self._curves[agent]:
+            if not self._scripted.active(step - 1)[agent]:
+                episodes.setdefault(step, {})[name] = value
+        wanted = self.settings.progress.select_training_episodes
+        return list(episodes.values())[-wanted:] if wanted else []
 
     def _trial(self) -> list[dict[str, float]]:
         observation = self.environments.reset()

@@ -109,4 +109,10 @@ class ProgressSettings(Frozen):
         gt=0,
     )
     select_episodes: int = key(3, "stochastic episodes of one trial; 0 keeps the last policy", unit="episodes", ge=0)
+    select_training_episodes: int = key(
+        5,
+        "a trial also counts this many of the last training episodes: three episodes alone flatter lucky policies",
+        unit="episodes",
+        ge=0,
+    )
     tensorboard: bool = key(False, "write TensorBoard event files beside curve.csv")

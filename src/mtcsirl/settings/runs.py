@@ -98,7 +98,7 @@ def expert_run(settings: Settings, task: str, cs_reward: str) -> AgentRunSetting
         expert.sac(settings.sac),
         task,
         expert.steps,
-        cs_weight=expert.cs_weight.get(cs_reward, 1.0) * expert.cs_weight_factor.get(task, 1.0),
+        cs_weight=expert.cs_weight.get(cs_reward, 1.0) * expert.cs_weight_factor.get(cs_reward, {}).get(task, 1.0),
         curriculum=expert.curriculum,
         warm_up_success=expert.warm_up_success,
         warm_up_episodes=expert.warm_up_episodes,

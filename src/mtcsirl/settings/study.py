@@ -162,8 +162,11 @@ class ExpertSettings(RewardScaleSettings):
         lambda: {"velocity": 20.0, "action_norm": 20.0},
         "C_v, C_n: weight of the ground-truth cs-reward beside r_task in [0, 10]",
     )
-    cs_weight_factor: dict[Task, Annotated[float, Field(gt=0)]] = key(
-        lambda: {"coffee-button": 2.0, "plate-slide": 2.0},
+    cs_weight_factor: dict[CsReward, dict[Task, Annotated[float, Field(gt=0)]]] = key(
+        lambda: {
+            "velocity": {"coffee-button": 3.0, "plate-slide": 3.0},
+            "action_norm": {"coffee-button": 2.0, "plate-slide": 2.0},
+        },
         "factor on cs_weight per task: more where the task pays for staying where it is done",
     )
     curriculum: bool = key(

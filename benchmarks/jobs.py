@@ -1,0 +1,92 @@
+"""What a training job costs before it trains and how much memory it holds, against a script of stable-baselines3.
+
+    python -m benchmarks.jobs
+
+start_up: seconds of CPU from the start of the process to the end of a job of two environment steps, `mtcsirl train-sac`
+with its evaluation of one step, and `SAC(...).learn(2)` on stock Meta-World. memory: MiB that each holds at most in a
+job of 2,000 steps with the desk scale's networks, minibatch and length of the replay memory. Smaller is better, so the
+ratio is theirs over ours.
+"""
+
+import json
+import os
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from importlib.metadata import version
+from pathlib import Path
+
+from benchmarks.sides import Row, command, row
+from mtcsirl.settings import Settings
+from mtcsirl.settings.runs import AgentRunSettings, baseline_run
+from mtcsirl.storage import write_json
+
+TASK = "reach-wall"
+START_STEPS, MEMORY_STEPS = 2, 2_000
+
+_PEER = """
+import json, sys
+import torch
+from stable_baselines3 import SAC
+from mtcsirl.fast_metaworld.identity import stock_environment
+
+torch.set_num_threads(1)
+steps, keywords = json.loads(sys.argv[1])
+SAC("MlpPolicy", stock_environment("reach-wall", 0), **keywords).learn(steps)
+"""
+
+
+def measure(rounds: int = 5) -> Iterator[Row]:
+    """Rows of start_up [1/s, so that more is better in both columns] and memory [1/MiB]."""
+    peer = f"stable-baselines3 {version('stable-baselines3')} on metaworld {version('metaworld')}"
+    for benchmark, steps, index in (("start_up", START_STEPS, 0), ("memory", MEMORY_STEPS, 1)):
+        turns = [[side(steps)[index] for side in (_ours, _theirs)] for _ in range(rounds)]
+        found = row(benchmark, f"{TASK}, {steps} steps", peer, turns)
+        # costs, not rates: seconds and MiB as they are
+        yield found | {"ours": 1 / found["ours"], "theirs": 1 / found["theirs"]}
+
+
+def _settings() -> AgentRunSettings:
+    return baseline_run(Settings(), TASK)
+
+
+def _ours(steps: int) -> tuple[float, float]:
+    settings = _settings().model_dump(mode="json")
+    settings |= {"steps": steps, "evaluation": {"episodes": 1, "episode_steps": min(steps, 500)}}
+    settings["progress"]["select_episodes"] = 0
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "run.json"
+        write_json(file, settings)
+        words = ["train-sac", "--task", TASK, "--target", "0", "--seed", "0", "--settings", str(file)]
+        return _cost([sys.executable, "-m", "mtcsirl.cli", *words, "--output", f"{folder}/run"])
+
+
+def _theirs(steps: int) -> tuple[float, float]:
+    settings = _settings()
+    keywords = {
+        "buffer_size": settings.steps,
+        "learning_starts": settings.sac.random_steps,
+        "batch_size": settings.sac.minibatch,
+        "train_freq": 2,
+        "policy_kwargs": {"net_arch": list(settings.sac.hidden_sizes)},
+        "device": "cpu",
+    }
+    return _cost([sys.executable, "-c", _PEER, json.dumps([steps, keywords])])
+
+
+def _cost(words: list[str]) -> tuple[float, float]:
+    """CPU seconds and most MiB of a process."""
+    environment = os.environ | {"OMP_NUM_THREADS": "1"}
+    process = subprocess.Popen(words, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
+    assert process.stderr is not None
+    complaint = process.stderr.read().decode()
+    _, status, usage = os.wait4(process.pid, 0)
+    process.returncode = os.waitstatus_to_exitcode(status)
+    if process.returncode:
+        raise RuntimeError(f"{' '.join(words[:4])}: {complaint.strip().splitlines()[-1]}")
+    return usage.ru_utime + usage.ru_stime, usage.ru_maxrss / 1024
+
+
+if __name__ == "__main__":
+    command(__doc__, measure, None)

@@ -1,0 +1,73 @@
+"""What the benchmarks share: a turn in CPU seconds, a row from the turns of both sides, a command line."""
+
+import argparse
+from collections.abc import Callable, Iterable
+from statistics import median, quantiles
+from time import thread_time
+from typing import Any
+
+import numpy as np
+import torch
+
+Row = dict[str, Any]
+_WIDTHS = (20, 42, 12, 12, 8, 14, 8)
+
+
+def seconds(call: Callable[[], Any], count: int = 1) -> float:
+    """CPU seconds of this thread for one call, the mean of ``count``."""
+    started = thread_time()
+    for _ in range(count):
+        call()
+    return (thread_time() - started) / count
+
+
+def row(benchmark: str, setting: str, peer: str, times: Iterable[Iterable[float]], work: float = 1.0) -> Row:
+    """A row {benchmark, setting, ours, theirs, peer, ratio, ratio_low, ratio_high} from (ours, theirs) of every round.
+
+    ours and theirs: ``work`` per second of the median turn. The ratio is the median of the rounds' ratios; ratio_low
+    and ratio_high are its quartiles over rounds.
+    """
+    turns = np.array([list(both) for both in times])
+    ratios = list(turns[:, 1] / turns[:, 0])
+    low, _, high = quantiles(ratios, n=4)
+    ours, theirs = (float(work / value) for value in np.median(turns, axis=0))
+    return {
+        "benchmark": benchmark,
+        "setting": setting,
+        "ours": ours,
+        "theirs": theirs,
+        "peer": peer,
+        "ratio": median(ratios),
+        "ratio_low": low,
+        "ratio_high": high,
+    }
+
+
+def print_rows(rows: Iterable[Row]) -> list[Row]:
+    """Print every row as it comes; returns them all."""
+    _print("benchmark", "setting", "ours", "theirs", "ratio", "quartiles", "GEMM")
+    found = []
+    for one in rows:
+        found.append(one)
+        quartiles = f"{one['ratio_low']:.2f} to {one['ratio_high']:.2f}" if "ratio_low" in one else ""
+        share = f"{one['gemm_share']:.0%}" if "gemm_share" in one else ""
+        numbers = (f"{one[name]:.4g}" for name in ("ours", "theirs", "ratio"))
+        _print(one["benchmark"], one["setting"], *numbers, quartiles, share)
+    return found
+
+
+def _print(*cells: str) -> None:
+    print("  ".join(cell.ljust(width) for cell, width in zip(cells, _WIDTHS, strict=True)).rstrip(), flush=True)
+
+
+def command(text: str | None, measure: Callable[[int], Iterable[Row]], profile: Callable[[], None] | None) -> None:
+    """The command line of one benchmark: the table, on request the profile."""
+    parser = argparse.ArgumentParser(description=text, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--rounds", type=int, default=5, help="turns of each side (default 5)")
+    if profile is not None:
+        parser.add_argument("--profile", action="store_true", help="show where the time of our side goes")
+    arguments = parser.parse_args()
+    torch.set_num_threads(1)
+    print_rows(measure(arguments.rounds))
+    if profile is not None and arguments.profile:
+        profile()
