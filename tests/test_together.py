@@ -69,3 +69,11 @@ def test_jobs_are_those_of_the_stages(tmp_path):
     assert (job_of(baseline, settings, tmp_path).gate, job_of(expert, settings, tmp_path).gate) == ("sac", "expert")
     assert job_of(expert, settings, tmp_path).settings == expert.settings(settings)
     assert job_of(expert, settings, tmp_path).settings.cs_weight == 40.0
+
+
+def test_variants_of_an_ablation_train_apart(settings, tmp_path):
+    lines: list[str] = []
+    study = design(settings, "ablation_observation")
+    assert train_together(study, settings, tmp_path, log=lines.append) == len(study.experts)
+    batches = [line for line in lines if line.startswith("train_expert")]
+    assert [line.count("/raw/") for line in batches] == [0, len(study.experts) // 2]

@@ -69,10 +69,10 @@ def train_together(
 
 
 def _batches(runs: Iterable[Run], settings: Settings, results: Path, most: int) -> Iterator[list[AgentRun]]:
-    """Agents of one stage and budget, ``most`` at a time; looked for anew before every batch."""
+    """Agents of one stage, variant and budget, ``most`` at a time; looked for anew before every batch."""
 
-    def together(run: AgentRun) -> tuple[str, int]:
-        return run.stage, run.settings(settings).steps  # type: ignore[attr-defined]
+    def together(run: AgentRun) -> tuple[str, str, int]:
+        return run.stage, getattr(run, "variant", ""), run.settings(settings).steps  # type: ignore[attr-defined]
 
     wanted = sorted((run for run in runs if isinstance(run, AgentRun)), key=together)
     for _, alike in groupby(wanted, key=together):
