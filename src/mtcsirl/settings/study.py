@@ -80,8 +80,10 @@ EXPERT_STEPS = {
     "default": 40_000,
     "button-press-topdown-wall": 60_000,
     "coffee-button": 60_000,
+    "faucet-open": 60_000,
     "plate-slide": 60_000,
-    "push-back": 80_000,
+    "push-back": 100_000,
+    "window-open": 60_000,
 }
 AGENT_STEPS = {"default": 30_000, "button-press-topdown-wall": 30_000, "push-back": 60_000}
 PAPER_STEPS = 250_000
