@@ -10,6 +10,7 @@ ratio is theirs over ours.
 
 import json
 import os
+import resource
 import subprocess
 import sys
 import tempfile
@@ -35,6 +36,11 @@ torch.set_num_threads(1)
 steps, keywords = json.loads(sys.argv[1])
 SAC("MlpPolicy", stock_environment("reach-wall", 0), **keywords).learn(steps)
 """
+_OURS = "import sys; from mtcsirl.cli import main; main(sys.argv[1:])"
+_PEAK = """
+print(next(line.split()[1] for line in open("/proc/self/status") if line.startswith("VmHWM")))
+"""
+"""Prints a process's own peak in KiB: what the kernel reports to its parent would begin with the parent's."""
 
 
 def measure(rounds: int = 5) -> Iterator[Row]:
@@ -59,7 +65,7 @@ def _ours(steps: int) -> tuple[float, float]:
         file = Path(folder) / "run.json"
         write_json(file, settings)
         words = ["train-sac", "--task", TASK, "--target", "0", "--seed", "0", "--settings", str(file)]
-        return _cost([sys.executable, "-m", "mtcsirl.cli", *words, "--output", f"{folder}/run"])
+        return _cost(_OURS, [*words, "--output", f"{folder}/run"])
 
 
 def _theirs(steps: int) -> tuple[float, float]:
@@ -72,20 +78,19 @@ def _theirs(steps: int) -> tuple[float, float]:
         "policy_kwargs": {"net_arch": list(settings.sac.hidden_sizes)},
         "device": "cpu",
     }
-    return _cost([sys.executable, "-c", _PEER, json.dumps([steps, keywords])])
+    return _cost(_PEER, [json.dumps([steps, keywords])])
 
 
-def _cost(words: list[str]) -> tuple[float, float]:
-    """CPU seconds and most MiB of a process."""
-    environment = os.environ | {"OMP_NUM_THREADS": "1"}
-    process = subprocess.Popen(words, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
-    assert process.stderr is not None
-    complaint = process.stderr.read().decode()
-    _, status, usage = os.wait4(process.pid, 0)
-    process.returncode = os.waitstatus_to_exitcode(status)
-    if process.returncode:
-        raise RuntimeError(f"{' '.join(words[:4])}: {complaint.strip().splitlines()[-1]}")
-    return usage.ru_utime + usage.ru_stime, usage.ru_maxrss / 1024
+def _cost(program: str, words: list[str]) -> tuple[float, float]:
+    """CPU seconds and most MiB of a Python process."""
+    command = [sys.executable, "-c", f"{program}\n{_PEAK}", *words]
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    done = subprocess.run(command, env=os.environ | {"OMP_NUM_THREADS": "1"}, capture_output=True, text=True)
+    if done.returncode:
+        raise RuntimeError(f"{words[0]}: {done.stderr.strip().splitlines()[-1]}")
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    seconds = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    return seconds, int(done.stdout.split()[-1]) / 1024
 
 
 if __name__ == "__main__":
