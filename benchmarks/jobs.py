@@ -44,12 +44,11 @@ print(next(line.split()[1] for line in open("/proc/self/status") if line.startsw
 
 
 def measure(rounds: int = 5) -> Iterator[Row]:
-    """Rows of start_up [1/s, so that more is better in both columns] and memory [1/MiB]."""
+    """Rows of start_up [s] and memory [MiB]: costs, unlike the other benchmarks' rates."""
     peer = f"stable-baselines3 {version('stable-baselines3')} on metaworld {version('metaworld')}"
     for benchmark, steps, index in (("start_up", START_STEPS, 0), ("memory", MEMORY_STEPS, 1)):
         turns = [[side(steps)[index] for side in (_ours, _theirs)] for _ in range(rounds)]
         found = row(benchmark, f"{TASK}, {steps} steps", peer, turns)
-        # costs, not rates: seconds and MiB as they are
         yield found | {"ours": 1 / found["ours"], "theirs": 1 / found["theirs"]}
 
 

@@ -49,7 +49,7 @@ def print_rows(rows: Iterable[Row]) -> list[Row]:
     found = []
     for one in rows:
         found.append(one)
-        quartiles = f"{one['ratio_low']:.2f} to {one['ratio_high']:.2f}" if "ratio_low" in one else ""
+        quartiles = f"{one['ratio_low']:.2f} to {one['ratio_high']:.2f}"
         share = f"{one['gemm_share']:.0%}" if "gemm_share" in one else ""
         numbers = (f"{one[name]:.4g}" for name in ("ours", "theirs", "ratio"))
         _print(one["benchmark"], one["setting"], *numbers, quartiles, share)

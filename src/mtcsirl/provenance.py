@@ -7,6 +7,7 @@ import platform
 import resource
 import subprocess
 import time
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -75,7 +76,7 @@ class Stopwatch:
 
 
 def write_provenance(
-    folder: Path | str, stopwatch: Stopwatch, inputs: dict[str, Path] | None = None, *, agents: int = 1
+    folder: Path | str, stopwatch: Stopwatch, inputs: Mapping[str, Path] | None = None, *, agents: int = 1
 ) -> None:
     """Write ``provenance.json`` into a run folder: commit, versions, machine, cost, checksums of the inputs.
 

@@ -4,7 +4,7 @@ Each takes the settings of its run, the run's key and the folder it fills; it ho
 that was killed and leaves ``settings.json`` and ``provenance.json`` beside its results.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -26,39 +26,23 @@ from mtcsirl.settings.runs import (
 CHECKPOINT = "checkpoint.safetensors"
 
 
-def train_expert(settings: AgentRunSettings, task: str, target: int, cs_reward: str, seed: int, output: Path) -> None:
-    """Train SAC on r_task + C alpha r_cs and keep the best policy by the expert's gate (appendix B)."""
-    _train(expert_job(settings, task, target, cs_reward, seed), output)
+def train(job: AgentJob, output: Path) -> None:
+    """Train one agent: stages ``train_expert``, ``train_sac`` and ``transfer``, by their jobs below."""
+    with _run(job.settings, output, job.inputs):
+        events = output / "events" if job.settings.progress.tensorboard else None
+        (agent,) = train_agents([job], checkpoint=output / CHECKPOINT, events=events)
+        agent.save(output)
 
 
 def expert_job(settings: AgentRunSettings, task: str, target: int, cs_reward: str, seed: int) -> AgentJob:
-    """The training job of an expert."""
+    """SAC on r_task + C alpha r_cs; keeps the best policy by the expert's gate (appendix B)."""
     f = ground_truth(cs_reward, settings.environment.observation)
     return AgentJob(task, target, seed, settings, cs_reward, f=f, gate="expert")
 
 
-def train_sac(settings: AgentRunSettings, task: str, target: int, seed: int, output: Path) -> None:
-    """Train SAC on r_task alone: the baseline."""
-    _train(AgentJob(task, target, seed, settings), output)
-
-
-def transfer(
-    settings: AgentRunSettings,
-    reward: Path,
-    task: str,
-    target: int,
-    cs_reward: str,
-    seed: int,
-    output: Path,
-    *,
-    learned_task_reward: bool = False,
-) -> None:
-    """Train a new agent from scratch on r_task + f with the frozen f in the folder ``reward``.
-
-    ``learned_task_reward``: MT-CSIRL+LT's learned task reward stands in for r_task (Table 4).
-    """
-    job = transfer_job(settings, reward, task, target, cs_reward, seed, learned_task_reward=learned_task_reward)
-    _train(job, output, reward_files(reward))
+def sac_job(settings: AgentRunSettings, task: str, target: int, seed: int) -> AgentJob:
+    """SAC on r_task alone: the baseline."""
+    return AgentJob(task, target, seed, settings)
 
 
 def transfer_job(
@@ -71,13 +55,12 @@ def transfer_job(
     *,
     learned_task_reward: bool = False,
 ) -> AgentJob:
-    """The training job of a transfer agent.
+    """SAC from scratch on r_task + f with the frozen f in the folder ``reward``.
 
-    The policy after the last step is kept: choosing one by the true metric would use what the learned reward has to
-    convey.
+    ``learned_task_reward``: MT-CSIRL+LT's learned task reward stands in for r_task (Table 4). The policy after the last
+    step is kept: choosing one by the true metric would use what the learned reward has to convey.
     """
     learned = load_learned_reward(reward)
-    task_reward = learned.task_reward(task, target) if learned_task_reward else None
     return AgentJob(
         task,
         target,
@@ -85,16 +68,12 @@ def transfer_job(
         settings,
         cs_reward,
         f=learned,
-        task_reward=task_reward,
+        task_reward=learned.task_reward(task, target) if learned_task_reward else None,
         gate="sac",
         keep="last",
         reward_id=storage.checksum(reward / WEIGHTS),
+        inputs={name: reward / name for name in (WEIGHTS, DESCRIPTION)},
     )
-
-
-def reward_files(reward: Path) -> dict[str, Path]:
-    """What a transfer agent reads of the folder ``reward``."""
-    return {name: reward / name for name in (WEIGHTS, DESCRIPTION)}
 
 
 def collect_demonstrations(
@@ -142,18 +121,18 @@ def score_reward(
         score(settings, reward, expert, baseline, task, target, cs_reward, seed, output)
 
 
-def _train(job: AgentJob, output: Path, inputs: dict[str, Path] | None = None) -> None:
-    with _run(job.settings, output, inputs):
-        events = output / "events" if job.settings.progress.tensorboard else None
-        (agent,) = train_agents([job], checkpoint=output / CHECKPOINT, events=events)
-        agent.save(output)
-
-
 @contextmanager
-def _run(settings: BaseModel, output: Path, inputs: dict[str, Path] | None = None) -> Iterator[None]:
+def _run(settings: BaseModel, output: Path, inputs: Mapping[str, Path]) -> Iterator[None]:
     """Hold the folder while the block fills it; then write its settings and provenance."""
     stopwatch = Stopwatch()
     with storage.locked(output):
         yield
-        storage.write_json(output / "settings.json", settings.model_dump(mode="json"))
-        write_provenance(output, stopwatch, inputs)
+        sign(output, settings, stopwatch, inputs)
+
+
+def sign(
+    output: Path, settings: BaseModel, stopwatch: Stopwatch, inputs: Mapping[str, Path], *, agents: int = 1
+) -> None:
+    """Leave settings and provenance in the folder of a finished run, one of ``agents`` that a process made at once."""
+    storage.write_json(output / "settings.json", settings.model_dump(mode="json"))
+    write_provenance(output, stopwatch, inputs, agents=agents)

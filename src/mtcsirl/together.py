@@ -15,11 +15,11 @@ from mtcsirl.agents.jobs import AgentJob
 from mtcsirl.agents.training import train_agents
 from mtcsirl.errors import UserError
 from mtcsirl.outputs import OUTPUTS
-from mtcsirl.provenance import Stopwatch, write_provenance
+from mtcsirl.provenance import Stopwatch
 from mtcsirl.rewards.learned import WEIGHTS
 from mtcsirl.settings import Settings
-from mtcsirl.stages import expert_job, reward_files, transfer_job
-from mtcsirl.storage import locked, write_json
+from mtcsirl.stages import expert_job, sac_job, sign, transfer_job
+from mtcsirl.storage import locked
 from mtcsirl.study import Baseline, Expert, Run, Transfer
 
 AgentRun = Expert | Baseline | Transfer
@@ -29,13 +29,12 @@ def job_of(run: AgentRun, settings: Settings, results: Path) -> AgentJob:
     """The training job of a run, as its stage makes it."""
     own = run.settings(settings)
     if isinstance(run, Baseline):
-        return AgentJob(run.task, run.target, run.seed, own)  # type: ignore[arg-type]
+        return sac_job(own, run.task, run.target, run.seed)  # type: ignore[arg-type]
     if isinstance(run, Expert):
         return expert_job(own, run.task, run.target, run.cs_reward, run.seed)  # type: ignore[arg-type]
-    reward = results / run.irl.folder
     return transfer_job(
         own,  # type: ignore[arg-type]
-        reward,
+        results / run.irl.folder,
         run.task,
         run.target,
         run.irl.cs_reward,
@@ -109,8 +108,5 @@ def _train(batch: list[AgentRun], settings: Settings, results: Path, log: Callab
     jobs = [job_of(run, settings, results) for run in batch]
     trained = train_agents(jobs, checkpoint=results / batch[0].folder / "together.safetensors", log=log)
     for run, agent in zip(batch, trained, strict=True):
-        folder = results / run.folder
-        agent.save(folder)
-        write_json(folder / "settings.json", agent.job.settings.model_dump(mode="json"))
-        inputs = reward_files(results / run.irl.folder) if isinstance(run, Transfer) else {}
-        write_provenance(folder, stopwatch, inputs, agents=len(batch))
+        agent.save(results / run.folder)
+        sign(results / run.folder, agent.job.settings, stopwatch, agent.job.inputs, agents=len(batch))

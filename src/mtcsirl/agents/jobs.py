@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
@@ -40,6 +40,8 @@ class AgentJob:
     keep: Literal["best", "last"] = "best"
     reward_id: str = ""
     """Tells learned rewards apart, for example a checksum: a run never resumes from a checkpoint of another reward."""
+    inputs: Mapping[str, Path] = field(default_factory=dict)
+    """Files that the job was made from, by name; provenance.json lists their checksums."""
 
     def mixture(self) -> RewardMixture:
         """The reward that this agent's policy is trained on."""

@@ -8,6 +8,8 @@ from typing import Any, TypeVar
 
 from pydantic import BaseModel
 
+from mtcsirl.ablations import ABLATIONS
+from mtcsirl.design import ARTEFACTS
 from mtcsirl.errors import UserError
 from mtcsirl.settings import Settings
 from mtcsirl.settings.loading import load, override, read_yaml, validate
@@ -54,6 +56,11 @@ def add_study_settings(verb: argparse.ArgumentParser) -> None:
     verb.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="one key; may be repeated")
 
 
+def add_artefact(verb: argparse.ArgumentParser) -> None:
+    """``--target`` of a verb that may look at one artefact alone."""
+    verb.add_argument("--target", type=artefact, metavar="NAME", help="one artefact, for example figure_3")
+
+
 def add_config(verb: argparse.ArgumentParser) -> None:
     """``--config`` and ``--scale``."""
     verb.add_argument("--scale", choices=("smoke", "desk", "paper"), help="overlay config/SCALE.yaml; default: desk")
@@ -90,6 +97,13 @@ def add_output(verb: argparse.ArgumentParser, default: str | None = None) -> Non
     verb.add_argument(
         "--output", required=default is None, default=default, type=Path, metavar="DIR", help="folder to write to"
     )
+
+
+def artefact(name: str) -> str:
+    """An artefact or ablation of the design."""
+    if name not in (*ARTEFACTS, *ABLATIONS):
+        raise argparse.ArgumentTypeError(f"unknown artefact {name!r}; allowed: {', '.join((*ARTEFACTS, *ABLATIONS))}")
+    return name
 
 
 def task(name: str) -> str:

@@ -37,7 +37,8 @@ def _train_expert(verbs: Verbs) -> None:
         from mtcsirl.settings.runs import AgentRunSettings, expert_run
 
         settings = run_settings(parsed, AgentRunSettings, lambda s: expert_run(s, parsed.task, parsed.cs_reward))
-        stages.train_expert(settings, parsed.task, parsed.target, parsed.cs_reward, parsed.seed, parsed.output)
+        job = stages.expert_job(settings, parsed.task, parsed.target, parsed.cs_reward, parsed.seed)
+        stages.train(job, parsed.output)
 
     verb = add_verb(
         verbs,
@@ -58,7 +59,7 @@ def _train_sac(verbs: Verbs) -> None:
         from mtcsirl.settings.runs import AgentRunSettings, baseline_run
 
         settings = run_settings(parsed, AgentRunSettings, lambda s: baseline_run(s, parsed.task))
-        stages.train_sac(settings, parsed.task, parsed.target, parsed.seed, parsed.output)
+        stages.train(stages.sac_job(settings, parsed.task, parsed.target, parsed.seed), parsed.output)
 
     verb = add_verb(
         verbs,
@@ -133,16 +134,16 @@ def _transfer(verbs: Verbs) -> None:
         from mtcsirl.settings.runs import AgentRunSettings, transfer_run
 
         settings = run_settings(parsed, AgentRunSettings, lambda s: transfer_run(s, parsed.task))
-        stages.transfer(
+        job = stages.transfer_job(
             settings,
             parsed.reward,
             parsed.task,
             parsed.target,
             parsed.cs_reward,
             parsed.seed,
-            parsed.output,
             learned_task_reward=parsed.task_reward == "learned",
         )
+        stages.train(job, parsed.output)
 
     verb = add_verb(
         verbs,

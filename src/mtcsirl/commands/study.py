@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mtcsirl.ablations import ABLATIONS
-from mtcsirl.commands.arguments import Verbs, add_study_settings, add_verb, study_settings
+from mtcsirl.commands.arguments import Verbs, add_artefact, add_study_settings, add_verb, study_settings
 from mtcsirl.design import ARTEFACTS, design
 
 if TYPE_CHECKING:
@@ -25,7 +25,7 @@ def register(verbs: Verbs) -> None:
         needs="the rates of this machine, or those that ship with the package (see calibrate)",
         writes="nothing",
     )
-    plan.add_argument("--target", type=artefact, metavar="NAME", help="one artefact, for example figure_3")
+    add_artefact(plan)
     plan.add_argument("--rates", type=Path, default=None, metavar="FILE", help="what calibrate wrote; default: shipped")
     plan.add_argument("--cores", type=int, default=2, metavar="N", help="cores to spread the jobs over; default 2")
     add_study_settings(plan)
@@ -38,7 +38,7 @@ def register(verbs: Verbs) -> None:
         needs="the study's results folder, finished or not",
         writes="nothing",
     )
-    status.add_argument("--target", type=artefact, metavar="NAME", help="one artefact, for example figure_3")
+    add_artefact(status)
     status.add_argument("--cores", type=int, default=2, metavar="N", help="cores for the time left; default 2")
     add_study_settings(status)
 
@@ -72,13 +72,6 @@ def register(verbs: Verbs) -> None:
         writes="the file that plan reads, --output",
     )
     calibrate.add_argument("--output", type=Path, required=True, metavar="FILE", help="a JSON file")
-
-
-def artefact(name: str) -> str:
-    """An artefact or ablation of the design."""
-    if name not in (*ARTEFACTS, *ABLATIONS):
-        raise argparse.ArgumentTypeError(f"unknown artefact {name!r}; allowed: {', '.join((*ARTEFACTS, *ABLATIONS))}")
-    return name
 
 
 def _plan(parsed: argparse.Namespace) -> None:

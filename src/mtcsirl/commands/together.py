@@ -3,8 +3,7 @@
 import argparse
 from pathlib import Path
 
-from mtcsirl.commands.arguments import Verbs, add_study_settings, add_verb, natural, study_settings
-from mtcsirl.commands.study import artefact
+from mtcsirl.commands.arguments import Verbs, add_artefact, add_study_settings, add_verb, natural, study_settings
 
 AGENT_STAGES = ("train_sac", "train_expert", "transfer")
 
@@ -19,7 +18,7 @@ def register(verbs: Verbs) -> None:
         needs="for transfer agents their learned rewards; agents whose reward is missing are left alone",
         writes="what train-sac, train-expert and transfer write, into the study's results folder",
     )
-    verb.add_argument("--target", type=artefact, metavar="NAME", help="one artefact, for example figure_3")
+    add_artefact(verb)
     verb.add_argument("--stages", nargs="+", choices=AGENT_STAGES, default=AGENT_STAGES, help="default: all three")
     verb.add_argument("--most", type=natural, default=16, metavar="N", help="agents in one batch; default 16")
     add_study_settings(verb)
