@@ -77,3 +77,13 @@ def test_variants_of_an_ablation_train_apart(settings, tmp_path):
     assert train_together(study, settings, tmp_path, log=lines.append) == len(study.experts)
     batches = [line for line in lines if line.startswith("train_expert")]
     assert [line.count("/raw/") for line in batches] == [0, len(study.experts) // 2]
+
+
+def test_only_agents_with_the_same_warm_up_share_a_batch(tmp_path):
+    changes = ["expert.warm_up_steps={default: 300, push-back: 400}", "expert.steps={default: 600}"]
+    settings = load(scale="smoke", overrides=[f"results={tmp_path}", *changes])
+    runs = [run for run in design(settings).experts if run.task in ("reach-wall", "drawer-close", "push-back")]
+    lines: list[str] = []
+    assert train_together(runs, settings, tmp_path, log=lines.append) == len(runs)
+    batches = [line for line in lines if line.startswith("train_expert")]
+    assert sorted(("push-back" in line, "reach-wall" in line) for line in batches) == [(False, True), (True, False)]

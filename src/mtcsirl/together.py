@@ -11,7 +11,7 @@ from contextlib import ExitStack, contextmanager
 from itertools import groupby
 from pathlib import Path
 
-from mtcsirl.agents.jobs import AgentJob
+from mtcsirl.agents.jobs import AgentJob, common_settings
 from mtcsirl.agents.training import train_agents
 from mtcsirl.errors import UserError
 from mtcsirl.outputs import OUTPUTS
@@ -68,10 +68,10 @@ def train_together(
 
 
 def _batches(runs: Iterable[Run], settings: Settings, results: Path, most: int) -> Iterator[list[AgentRun]]:
-    """Agents of one stage, variant and budget, ``most`` at a time; looked for anew before every batch."""
+    """Agents of one stage that may train in lockstep, ``most`` at a time; looked for anew before every batch."""
 
-    def together(run: AgentRun) -> tuple[str, str, int]:
-        return run.stage, getattr(run, "variant", ""), run.settings(settings).steps  # type: ignore[attr-defined]
+    def together(run: AgentRun) -> tuple[str, str]:
+        return run.stage, common_settings(run.settings(settings)).model_dump_json()  # type: ignore[arg-type]
 
     wanted = sorted((run for run in runs if isinstance(run, AgentRun)), key=together)
     for _, alike in groupby(wanted, key=together):

@@ -74,20 +74,21 @@ class TrainedAgent:
         storage.write_json(folder / "gate.json", self.gate)
 
 
+def common_settings(settings: AgentRunSettings) -> AgentRunSettings:
+    """``settings`` without what agents that train in lockstep may differ in: agents in one batch agree in the rest."""
+    own: dict[str, Any] = {"cs_weight": 0.0, "curriculum": False, "scripted_steps": 0, "scripted_noise": 0.0}
+    sac = settings.sac.model_copy(update={"reward_scale": 1.0})
+    return settings.model_copy(update={**own, "sac": sac})
+
+
 def shared_settings(jobs: Sequence[AgentJob]) -> AgentRunSettings:
     """The settings of agents that train in lockstep.
 
     Raises UserError when they differ in more than reward scale, cs_weight, curriculum or scripted steps.
     """
-    own: dict[str, Any] = {"cs_weight": 0.0, "curriculum": False, "scripted_steps": 0, "scripted_noise": 0.0}
-
-    def common(settings: AgentRunSettings) -> AgentRunSettings:
-        sac = settings.sac.model_copy(update={"reward_scale": 1.0})
-        return settings.model_copy(update={**own, "sac": sac})
-
-    first = common(jobs[0].settings)
+    first = common_settings(jobs[0].settings)
     for job in jobs:
-        if common(job.settings) != first:
+        if common_settings(job.settings) != first:
             raise UserError(
                 f"{job.task}-t{job.target} s{job.seed}: agents in lockstep share all settings but reward_scale, "
                 "cs_weight, curriculum and scripted_steps; train it on its own"

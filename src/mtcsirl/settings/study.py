@@ -79,11 +79,11 @@ Budget = Annotated[dict[str, Annotated[int, Field(gt=0)]], AfterValidator(_known
 EXPERT_STEPS = {
     "default": 40_000,
     "button-press-topdown-wall": 60_000,
-    "coffee-button": 60_000,
+    "coffee-button": 80_000,
     "faucet-open": 60_000,
-    "plate-slide": 60_000,
+    "plate-slide": 80_000,
     "push-back": 100_000,
-    "window-open": 60_000,
+    "window-open": 80_000,
 }
 AGENT_STEPS = {"default": 30_000, "button-press-topdown-wall": 30_000, "push-back": 60_000}
 PAPER_STEPS = 250_000
@@ -166,7 +166,7 @@ class ExpertSettings(RewardScaleSettings):
     )
     cs_weight_factor: dict[CsReward, dict[Task, Annotated[float, Field(gt=0)]]] = key(
         lambda: {
-            "velocity": {"coffee-button": 3.0, "plate-slide": 3.0},
+            "velocity": {"button-press-topdown-wall": 0.5, "coffee-button": 3.0, "plate-slide": 3.0},
             "action_norm": {"coffee-button": 2.0, "plate-slide": 2.0},
         },
         "factor on cs_weight per task: more where the task pays for staying where it is done",
