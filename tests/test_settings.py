@@ -13,8 +13,9 @@ from pydantic import ValidationError
 from mtcsirl.errors import UserError
 from mtcsirl.irl.methods import METHODS
 from mtcsirl.rewards.ground_truth import COMMON_SENSE_REWARDS
-from mtcsirl.settings import Settings, steps_for
+from mtcsirl.settings import Settings, granted
 from mtcsirl.settings.loading import load, merge, override, read_yaml, validate
+from mtcsirl.settings.runs import irl_run
 from mtcsirl.settings.template import as_json, deviations, keys, schema, template
 
 
@@ -190,9 +191,19 @@ def test_registries_and_defaults_agree() -> None:
     assert set(Settings().expert.cs_weight) == set(Settings().cs_rewards)
 
 
-def test_steps_for() -> None:
-    assert steps_for({"default": 5, "reach": 7}, "reach") == 7
-    assert steps_for({"default": 5, "reach": 7}, "push") == 5
+def test_granted() -> None:
+    assert granted({"default": 5, "reach": 7}, "reach") == 7
+    assert granted({"default": 5, "reach": 7}, "push") == 5
+
+
+def test_a_run_warms_up_as_long_as_its_slowest_task_asks() -> None:
+    settings = override(Settings().model_dump(mode="json"), ["irl.warm_up_iterations={default: 2, plate-slide: 5}"])
+    study = validate(Settings, settings)
+    rounds = [
+        irl_run(study, "multi_task", tasks).irl.warm_up_iterations for tasks in (["reach"], ["reach", "plate-slide"])
+    ]
+    assert rounds == [2, 5]
+    assert irl_run(study, "multi_task", ["reach"]) != irl_run(study, "multi_task", ["plate-slide"])
 
 
 @pytest.mark.parametrize("module", ["settings.loading", "design", "plan", "status", "cli"])

@@ -18,6 +18,7 @@ from mtcsirl.figures.style import (
     styled,
     target_of,
 )
+from mtcsirl.settings.runs import irl_run
 from mtcsirl.study import EVALUATION_TARGET
 
 EXPERIMENT, METHOD = "single_target", "mt_csirl"
@@ -69,7 +70,7 @@ def draw(data: FigureData, artefact: str, task: str, metrics: list[str], *, scat
     for index, metric in enumerate(metrics):
         series = curve_series(data, artefact, task, metric)
         draw_curves(axes[index], series, metric, target_of(metric))
-        _mark_warm_up(axes[index], data)
+        _mark_warm_up(axes[index], warm_up_steps(data, task))
         panel_title(axes[index], index, quantity(metric).capitalize())
         notes += [f"({chr(ord('a') + index)}) {note}" for note in missing_note(series)]
     if scatter:
@@ -93,7 +94,7 @@ def caption(data: FigureData, artefact: str, task: str, metrics: list[str], *, s
         f"Lines and bands: mean and 95 % t-interval over seeds ({numbers}); bands are cut off at the frame, "
         "curves end where the shortest run does."
     )
-    warm_up = warm_up_steps(data)
+    warm_up = warm_up_steps(data, task)
     if warm_up:
         text += f" IRL starts after {warm_up:,} steps on r_task alone (dotted line)."
     if scatter:
@@ -102,13 +103,13 @@ def caption(data: FigureData, artefact: str, task: str, metrics: list[str], *, s
     return text
 
 
-def warm_up_steps(data: FigureData) -> int:
+def warm_up_steps(data: FigureData, task: str) -> int:
     """Environment steps that a generator spends on the task reward alone before IRL."""
-    return data.settings.irl.warm_up_iterations * data.settings.irl.steps_per_iteration
+    irl = irl_run(data.settings, "single_target", [task]).irl
+    return irl.warm_up_iterations * irl.steps_per_iteration
 
 
-def _mark_warm_up(axes: Axes, data: FigureData) -> None:
-    steps = warm_up_steps(data)
+def _mark_warm_up(axes: Axes, steps: int) -> None:
     if 0 < steps < axes.get_xlim()[1]:
         axes.axvline(steps, color="0.45", linewidth=0.8, linestyle=":")
         axes.annotate(

@@ -4,6 +4,7 @@ The defaults are the desk scale; ``config/config.yaml`` is written from these cl
 are small overlays.
 """
 
+from mtcsirl.settings.budgets import granted
 from mtcsirl.settings.irl import DiscriminatorSettings, IrlSettings, ScoreSettings, TransferSettings
 from mtcsirl.settings.learner import (
     EnvironmentSettings,
@@ -23,7 +24,6 @@ from mtcsirl.settings.study import (
     Settings,
     SingleTargetSettings,
     TransferStudySettings,
-    steps_for,
 )
 
 __all__ = [
@@ -46,5 +46,5 @@ __all__ = [
     "SingleTargetSettings",
     "TransferSettings",
     "TransferStudySettings",
-    "steps_for",
+    "granted",
 ]

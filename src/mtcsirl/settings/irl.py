@@ -30,17 +30,10 @@ class DiscriminatorSettings(Frozen):
     )
 
 
-class IrlSettings(Frozen):
-    """Algorithms 1 and 2."""
+class IrlAlgorithmSettings(Frozen):
+    """Algorithms 1 and 2; how long generators warm up is a matter of their tasks."""
 
     iterations: int = key(80, "N: outer iterations after the warm-up", unit="iterations", gt=0)
-    warm_up_iterations: int = key(
-        20,
-        "iterations on the task reward alone before IRL; methods that do not know it spend them on IRL too",
-        unit="iterations",
-        paper=0,
-        ge=0,
-    )
     steps_per_iteration: int = key(
         500,
         "environment steps that each generator collects per iteration",
@@ -106,6 +99,18 @@ class IrlSettings(Frozen):
         return RewardScaleSettings(
             temperature=self.temperature, initial_temperature=self.initial_temperature, reward_scale=1.0
         )
+
+
+class IrlSettings(IrlAlgorithmSettings):
+    """Algorithms 1 and 2 as one run has them."""
+
+    warm_up_iterations: int = key(
+        20,
+        "iterations on the task reward alone before IRL; methods that do not know it spend them on IRL too",
+        unit="iterations",
+        paper=0,
+        ge=0,
+    )
 
 
 class TransferSettings(RewardScaleSettings):

@@ -9,7 +9,8 @@ from typing import Any
 from pydantic import Field
 
 from mtcsirl.settings.base import Frozen
-from mtcsirl.settings.irl import IrlSettings, ScoreSettings
+from mtcsirl.settings.budgets import granted
+from mtcsirl.settings.irl import IrlAlgorithmSettings, IrlSettings, ScoreSettings
 from mtcsirl.settings.learner import (
     EnvironmentSettings,
     EvaluationSettings,
@@ -17,7 +18,7 @@ from mtcsirl.settings.learner import (
     ProgressSettings,
     SacSettings,
 )
-from mtcsirl.settings.study import Settings, steps_for
+from mtcsirl.settings.study import Settings
 
 
 class AgentRunSettings(Frozen):
@@ -76,7 +77,7 @@ def _agent(settings: Settings, sac: SacSettings, task: str, budget: dict[str, in
     return AgentRunSettings(
         environment=settings.environment,
         sac=sac,
-        steps=steps_for(budget, task),
+        steps=granted(budget, task),
         **_scripted(settings, task),
         evaluation=settings.evaluation,
         gates=settings.gates,
@@ -102,7 +103,7 @@ def expert_run(settings: Settings, task: str, cs_reward: str) -> AgentRunSetting
         curriculum=expert.curriculum,
         warm_up_success=expert.warm_up_success,
         warm_up_episodes=expert.warm_up_episodes,
-        warm_up_steps=steps_for(expert.warm_up_steps, task),
+        warm_up_steps=granted(expert.warm_up_steps, task),
     )
 
 
@@ -138,7 +139,7 @@ def irl_run(settings: Settings, experiment: str, tasks: Collection[str]) -> IrlR
     return IrlRunSettings(
         environment=settings.environment,
         sac=settings.irl.reward_scale().sac(settings.sac),
-        irl=settings.irl,
+        irl=_irl(settings, tasks),
         scripted_steps=scripted,
         scripted_noise=settings.exploration.scripted_noise if scripted else 0.0,
         demonstration_episodes=settings.demonstrations.episodes[experiment],  # type: ignore[index]
@@ -146,6 +147,13 @@ def irl_run(settings: Settings, experiment: str, tasks: Collection[str]) -> IrlR
         gates=settings.gates,
         progress=settings.progress,
     )
+
+
+def _irl(settings: Settings, tasks: Collection[str]) -> IrlSettings:
+    """The algorithm with the warm-up of the slowest of ``tasks``: generators go through it together."""
+    study = settings.irl
+    shared = {name: getattr(study, name) for name in IrlAlgorithmSettings.model_fields}
+    return IrlSettings(**shared, warm_up_iterations=max(granted(study.warm_up_iterations, task) for task in tasks))
 
 
 def score_run(settings: Settings) -> ScoreRunSettings:

@@ -9,7 +9,8 @@ from mtcsirl.extensions import load_extensions
 from mtcsirl.irl.methods import METHODS as METHOD_REGISTRY
 from mtcsirl.rewards.ground_truth import COMMON_SENSE_REWARDS
 from mtcsirl.settings.base import Frozen, key
-from mtcsirl.settings.irl import IrlSettings, ScoreSettings, TransferSettings
+from mtcsirl.settings.budgets import Budget, Iterations, Task
+from mtcsirl.settings.irl import IrlAlgorithmSettings, ScoreSettings, TransferSettings
 from mtcsirl.settings.learner import (
     EnvironmentSettings,
     EvaluationSettings,
@@ -18,7 +19,7 @@ from mtcsirl.settings.learner import (
     ProgressSettings,
     RewardScaleSettings,
 )
-from mtcsirl.tasks import TARGETS_PER_TASK, TASKS
+from mtcsirl.tasks import TARGETS_PER_TASK
 
 SINGLE_TASKS = ("reach-wall", "button-press-topdown-wall", "drawer-close", "push-back", "coffee-button")
 TRAIN_TASKS = ("window-open", "reach", "plate-slide", "faucet-open", "coffee-button", "door-close")
@@ -27,14 +28,6 @@ DESIGN_TASKS = tuple(dict.fromkeys(SINGLE_TASKS + TRAIN_TASKS))
 UNSEEN_TASKS = ("reach-wall", "button-press-topdown-wall", "drawer-close", "push-back")
 METHODS = ("mt_airl", "mt_vairl", "mt_vairl_gp", "mt_csirl", "mt_csirl_lt")
 CS_REWARDS = ("velocity", "action_norm")
-
-
-def _known_task(name: str) -> str:
-    if name not in TASKS:
-        raise ValueError(
-            f"unknown task {name!r}; allowed: Meta-World's names without '-v3', e.g. {', '.join(TASKS[:6])}, ..."
-        )
-    return name
 
 
 def _known_method(name: str) -> str:
@@ -57,16 +50,6 @@ def _unique(values: tuple) -> tuple:
     return values
 
 
-def _known_budget_keys(budget: dict[str, int]) -> dict[str, int]:
-    if "default" not in budget:
-        raise ValueError("needs the key 'default'")
-    for name in budget:
-        if name != "default":
-            _known_task(name)
-    return budget
-
-
-Task = Annotated[str, AfterValidator(_known_task)]
 Tasks = Annotated[tuple[Task, ...], Field(min_length=1), AfterValidator(_unique)]
 Target = Annotated[int, Field(ge=0, lt=TARGETS_PER_TASK)]
 Method = Annotated[str, AfterValidator(_known_method)]
@@ -74,8 +57,6 @@ CsReward = Annotated[str, AfterValidator(_known_cs_reward)]
 Targets = Annotated[tuple[Target, ...], Field(min_length=1), AfterValidator(_unique)]
 Seed = Annotated[int, Field(ge=0)]
 Seeds = Annotated[tuple[Seed, ...], Field(min_length=1), AfterValidator(_unique)]
-Budget = Annotated[dict[str, Annotated[int, Field(gt=0)]], AfterValidator(_known_budget_keys)]
-"""Environment steps: the key ``default`` and one key per task that differs."""
 EXPERT_STEPS = {
     "default": 40_000,
     "button-press-topdown-wall": 60_000,
@@ -86,13 +67,17 @@ EXPERT_STEPS = {
     "window-open": 80_000,
 }
 AGENT_STEPS = {"default": 30_000, "button-press-topdown-wall": 30_000, "push-back": 60_000}
+WARM_UP_ITERATIONS = {
+    "default": 20,
+    "button-press-topdown-wall": 40,
+    "coffee-button": 40,
+    "faucet-open": 40,
+    "plate-slide": 40,
+    "push-back": 110,
+    "window-open": 40,
+}
 PAPER_STEPS = 250_000
 """500 epochs of 500 steps (Table 5), for every task."""
-
-
-def steps_for(budget: dict[str, int], task: str) -> int:
-    """The number of environment steps that ``budget`` grants to ``task``."""
-    return budget.get(task, budget["default"])
 
 
 class ExplorationSettings(Frozen):
@@ -167,7 +152,7 @@ class ExpertSettings(RewardScaleSettings):
     cs_weight_factor: dict[CsReward, dict[Task, Annotated[float, Field(gt=0)]]] = key(
         lambda: {
             "velocity": {"button-press-topdown-wall": 0.5, "coffee-button": 3.0, "plate-slide": 3.0},
-            "action_norm": {"coffee-button": 2.0, "plate-slide": 2.0},
+            "action_norm": {"coffee-button": 2.0, "plate-slide": 2.0, "reach": 2.0, "reach-wall": 2.0},
         },
         "factor on cs_weight per task: more where the task pays for staying where it is done",
     )
@@ -195,6 +180,18 @@ class DemonstrationSettings(Frozen):
         "episodes of 500 steps per task and target, by experiment",
         unit="episodes",
         paper={"single_target": 120, "multi_target": 120, "multi_task": 20},
+    )
+
+
+class IrlStudySettings(IrlAlgorithmSettings):
+    """Inverse reinforcement learning."""
+
+    warm_up_iterations: Iterations = key(
+        lambda: dict(WARM_UP_ITERATIONS),
+        "iterations on the task reward alone before IRL, as many as the slowest task of a run asks for; methods that"
+        " do not know it spend them on IRL too",
+        unit="iterations",
+        paper=dict.fromkeys(WARM_UP_ITERATIONS, 0),
     )
 
 
@@ -249,7 +246,7 @@ class Settings(Frozen):
     expert: ExpertSettings = key(ExpertSettings, "experts")
     baseline: BaselineSettings = key(BaselineSettings, "plain SAC")
     demonstrations: DemonstrationSettings = key(DemonstrationSettings, "demonstrations")
-    irl: IrlSettings = key(IrlSettings, "inverse reinforcement learning")
+    irl: IrlStudySettings = key(IrlStudySettings, "inverse reinforcement learning")
     transfer: TransferStudySettings = key(TransferStudySettings, "new agents on the learned reward")
     score: ScoreSettings = key(ScoreSettings, "correlation of learned and true reward")
     evaluation: EvaluationSettings = key(EvaluationSettings, "final evaluation of every agent")
