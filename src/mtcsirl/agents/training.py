@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
@@ -17,20 +16,17 @@ import torch
 
 from mtcsirl import storage
 from mtcsirl.agents.checkpoint import load_checkpoint, prefixed, save_checkpoint, without_prefix
+from mtcsirl.agents.held import HeldExplorers
 from mtcsirl.agents.jobs import AgentJob, TrainedAgent, gate_score, shared_settings
+from mtcsirl.agents.learners import make_learner
 from mtcsirl.agents.lockstep import TaskEnvironments, make_environments
 from mtcsirl.agents.policy import Policy
 from mtcsirl.agents.progress import Progress
 from mtcsirl.agents.relabelling import PolicyReward
 from mtcsirl.agents.replay import Replay
-from mtcsirl.agents.sac import FusedSac
 from mtcsirl.agents.scripted import ScriptedExplorers
-from mtcsirl.environments import ACTION_SIZE, OBSERVATION_SIZE
+from mtcsirl.environments import ACTION_SIZE
 from mtcsirl.evaluation import gate_verdict, measure_episode, stochastic_means
-from mtcsirl.settings import SacSettings
-
-if TYPE_CHECKING:
-    from mtcsirl.agents.reference import ReferenceSac
 
 
 def train_agents(
@@ -85,8 +81,9 @@ class Training:
         self._best: list[tuple[tuple[float, float, float], Policy] | None] = [None] * len(jobs)
         self._curves: list[list[tuple[int, str, float]]] = [[] for _ in jobs]
         self._checkpoint = None if checkpoint is None else Path(checkpoint)
-        tasks = [(job.task, job.target) for job in jobs]
-        self.environments: TaskEnvironments = make_environments(tasks, self.settings.environment, workers)
+        self.environments: TaskEnvironments = make_environments(
+            [(job.task, job.target) for job in jobs], self.settings.environment, workers
+        )
         self._scripted = ScriptedExplorers(
             [job.task for job in jobs],
             seeds,
@@ -94,6 +91,7 @@ class Training:
             [job.settings.scripted_noise for job in jobs],
             self.settings.environment.observation,
         )
+        self._held = HeldExplorers(seeds, self.settings)
         self._progress = Progress(self.settings.steps, log, events)
         self._log = log
 
@@ -171,11 +169,12 @@ class Training:
             action = self._random.uniform(-1.0, 1.0, (len(self.jobs), ACTION_SIZE)).astype(np.float32)
         else:
             action = self._policy_action(observation)
+            self._held.replace(action, self.step)
         self._scripted.replace(action, observation, self.step)
         return action
 
-    def _policy_action(self, observation: np.ndarray) -> np.ndarray:
-        return self.learner.act(torch.from_numpy(observation).to(self.learner.device)).cpu().numpy()
+    def _policy_action(self, seen: np.ndarray) -> np.ndarray:
+        return self.learner.act(torch.from_numpy(seen).to(self.learner.device)).cpu().numpy()
 
     def _update(self) -> None:
         """Catch up with updates_per_step gradient steps per environment step after the random ones."""
@@ -279,19 +278,3 @@ class Training:
         self._reward.counts.copy_(torch.tensor(notes["counts"]))
         self._curves = [[(step, name, value) for step, name, value in curve] for curve in notes["curves"]]
         self._log(f"resumed at step {self.step}")
-
-
-def make_learner(
-    agents: int,
-    settings: SacSettings,
-    seeds: Sequence[int],
-    *,
-    observation_size: int = OBSERVATION_SIZE,
-    action_size: int = ACTION_SIZE,
-) -> FusedSac | ReferenceSac:
-    """The learner that `sac.learner` names."""
-    if settings.learner == "stable_baselines3":
-        from mtcsirl.agents.reference import ReferenceSac
-
-        return ReferenceSac(agents, settings, seeds=seeds, observation_size=observation_size, action_size=action_size)
-    return FusedSac(agents, settings, seeds=seeds, observation_size=observation_size, action_size=action_size)

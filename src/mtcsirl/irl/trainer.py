@@ -6,10 +6,10 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from mtcsirl.agents.learners import make_learner
 from mtcsirl.agents.lockstep import Outcome
 from mtcsirl.agents.replay import Replay
 from mtcsirl.agents.scripted import ScriptedExplorers
-from mtcsirl.agents.training import make_learner
 from mtcsirl.irl.curriculum import Curriculum
 from mtcsirl.irl.densities import Densities
 from mtcsirl.irl.diagnostics import (

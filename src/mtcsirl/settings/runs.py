@@ -38,6 +38,9 @@ class AgentRunSettings(Frozen):
     warm_up_steps: int = Field(default=0, ge=0, description="the cs-reward counts from here at the latest")
     scripted_steps: int = Field(default=0, ge=0, description="first actions, those of Meta-World's hand-written policy")
     scripted_noise: float = Field(default=0.0, ge=0, description="standard deviation of the noise on them")
+    held_share: float = Field(default=0.0, ge=0, le=1, description="share of blocks with a random action held")
+    held_steps: int = Field(default=16, gt=0, description="environment steps of a block")
+    held_until: int = Field(default=0, ge=0, description="no such block from this environment step on")
     evaluation: EvaluationSettings = Field(default_factory=EvaluationSettings)
     gates: GateSettings = Field(default_factory=GateSettings)
     progress: ProgressSettings = Field(default_factory=ProgressSettings)
@@ -104,6 +107,9 @@ def expert_run(settings: Settings, task: str, cs_reward: str) -> AgentRunSetting
         warm_up_success=expert.warm_up_success,
         warm_up_episodes=expert.warm_up_episodes,
         warm_up_steps=granted(expert.warm_up_steps, task),
+        held_share=expert.held_share,
+        held_steps=expert.held_steps,
+        held_until=int(expert.held_until * granted(expert.steps, task)),
     )
 
 

@@ -156,6 +156,19 @@ class ExpertSettings(RewardScaleSettings):
         },
         "factor on cs_weight per task: more where the task pays for staying where it is done",
     )
+    held_share: float = key(
+        0.0,
+        "share of blocks of held_steps steps in which the agent holds one random action: frees a hand that does its"
+        " task slowly and sees no gradient towards doing it fast",
+        unit="share",
+        paper=0.0,
+        ge=0,
+        le=1,
+    )
+    held_steps: int = key(
+        16, "length of a block; the hand needs 8 steps to its full speed", unit="environment steps", gt=0
+    )
+    held_until: float = key(0.75, "no such block after this share of the budget", unit="share", ge=0, le=1)
     curriculum: bool = key(
         True, "weight the ground-truth cs-reward by r_ave / R_MAX, as section 3.3 does for f", paper=False
     )
