@@ -59,11 +59,13 @@ Seed = Annotated[int, Field(ge=0)]
 Seeds = Annotated[tuple[Seed, ...], Field(min_length=1), AfterValidator(_unique)]
 EXPERT_STEPS = {
     "default": 40_000,
-    "button-press-topdown-wall": 60_000,
+    "button-press-topdown-wall": 100_000,
     "coffee-button": 80_000,
-    "faucet-open": 60_000,
+    "faucet-open": 80_000,
     "plate-slide": 80_000,
     "push-back": 100_000,
+    "reach": 60_000,
+    "reach-wall": 60_000,
     "window-open": 80_000,
 }
 AGENT_STEPS = {"default": 30_000, "button-press-topdown-wall": 30_000, "push-back": 60_000}
@@ -152,7 +154,7 @@ class ExpertSettings(RewardScaleSettings):
     cs_weight_factor: dict[CsReward, dict[Task, Annotated[float, Field(gt=0)]]] = key(
         lambda: {
             "velocity": {"button-press-topdown-wall": 0.5, "coffee-button": 3.0, "plate-slide": 3.0},
-            "action_norm": {"coffee-button": 2.0, "plate-slide": 2.0, "reach": 2.0, "reach-wall": 2.0},
+            "action_norm": {"plate-slide": 2.0},
         },
         "factor on cs_weight per task: more where the task pays for staying where it is done",
     )
