@@ -60,7 +60,7 @@ Seeds = Annotated[tuple[Seed, ...], Field(min_length=1), AfterValidator(_unique)
 EXPERT_STEPS = {
     "default": 40_000,
     "button-press-topdown-wall": 100_000,
-    "coffee-button": 80_000,
+    "coffee-button": 100_000,
     "faucet-open": 80_000,
     "plate-slide": 80_000,
     "push-back": 100_000,
@@ -153,19 +153,17 @@ class ExpertSettings(RewardScaleSettings):
     )
     cs_weight_factor: dict[CsReward, dict[Task, Annotated[float, Field(gt=0)]]] = key(
         lambda: {
-            "velocity": {"button-press-topdown-wall": 0.5, "coffee-button": 3.0, "plate-slide": 3.0},
+            "velocity": {"button-press-topdown-wall": 0.5, "coffee-button": 2.0, "plate-slide": 1.5},
             "action_norm": {"plate-slide": 2.0},
         },
         "factor on cs_weight per task: more where the task pays for staying where it is done",
     )
-    held_share: float = key(
-        0.0,
+    held_share: dict[CsReward, Annotated[float, Field(ge=0, le=1)]] = key(
+        lambda: {"velocity": 0.1, "action_norm": 0.0},
         "share of blocks of held_steps steps in which the agent holds one random action: frees a hand that does its"
         " task slowly and sees no gradient towards doing it fast",
         unit="share",
-        paper=0.0,
-        ge=0,
-        le=1,
+        paper={"velocity": 0.0, "action_norm": 0.0},
     )
     held_steps: int = key(
         16, "length of a block; the hand needs 8 steps to its full speed", unit="environment steps", gt=0
