@@ -153,7 +153,7 @@ class ExpertSettings(RewardScaleSettings):
     )
     cs_weight_factor: dict[CsReward, dict[Task, Annotated[float, Field(gt=0)]]] = key(
         lambda: {
-            "velocity": {"button-press-topdown-wall": 0.5, "coffee-button": 2.0, "plate-slide": 1.5},
+            "velocity": {"button-press-topdown-wall": 0.75, "coffee-button": 2.0, "plate-slide": 1.5},
             "action_norm": {"plate-slide": 2.0},
         },
         "factor on cs_weight per task: more where the task pays for staying where it is done",
