@@ -66,7 +66,7 @@ EXPERT_STEPS = {
     "push-back": 100_000,
     "reach": 60_000,
     "reach-wall": 60_000,
-    "window-open": 80_000,
+    "window-open": 100_000,
 }
 AGENT_STEPS = {"default": 30_000, "button-press-topdown-wall": 30_000, "push-back": 60_000}
 WARM_UP_ITERATIONS = {
@@ -153,7 +153,7 @@ class ExpertSettings(RewardScaleSettings):
     )
     cs_weight_factor: dict[CsReward, dict[Task, Annotated[float, Field(gt=0)]]] = key(
         lambda: {
-            "velocity": {"button-press-topdown-wall": 0.75, "coffee-button": 2.0, "plate-slide": 1.5},
+            "velocity": {"button-press-topdown-wall": 0.75, "coffee-button": 3.0, "plate-slide": 1.5},
             "action_norm": {"plate-slide": 2.0},
         },
         "factor on cs_weight per task: more where the task pays for staying where it is done",
