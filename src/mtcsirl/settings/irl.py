@@ -33,7 +33,7 @@ class DiscriminatorSettings(Frozen):
 class IrlAlgorithmSettings(Frozen):
     """Algorithms 1 and 2; how long generators warm up is a matter of their tasks."""
 
-    iterations: int = key(80, "N: outer iterations after the warm-up", unit="iterations", gt=0)
+    iterations: int = key(120, "N: outer iterations after the warm-up", unit="iterations", gt=0)
     steps_per_iteration: int = key(
         500,
         "environment steps that each generator collects per iteration",

@@ -70,13 +70,11 @@ EXPERT_STEPS = {
 }
 AGENT_STEPS = {"default": 30_000, "button-press-topdown-wall": 30_000, "push-back": 60_000}
 WARM_UP_ITERATIONS = {
-    "default": 20,
+    "default": 0,
     "button-press-topdown-wall": 40,
-    "coffee-button": 40,
-    "faucet-open": 40,
-    "plate-slide": 40,
+    "drawer-close": 20,
     "push-back": 110,
-    "window-open": 40,
+    "reach-wall": 20,
 }
 PAPER_STEPS = 250_000
 """500 epochs of 500 steps (Table 5), for every task."""
@@ -153,7 +151,7 @@ class ExpertSettings(RewardScaleSettings):
     )
     cs_weight_factor: dict[CsReward, dict[Task, Annotated[float, Field(gt=0)]]] = key(
         lambda: {
-            "velocity": {"button-press-topdown-wall": 0.75, "coffee-button": 3.0, "plate-slide": 1.5},
+            "velocity": {"coffee-button": 2.0, "plate-slide": 1.5},
             "action_norm": {"plate-slide": 2.0},
         },
         "factor on cs_weight per task: more where the task pays for staying where it is done",
