@@ -5,15 +5,18 @@ import pytest
 
 from mtcsirl.agents.held import HeldExplorers
 from mtcsirl.settings.loading import load
-from mtcsirl.settings.runs import AgentRunSettings, expert_run
+from mtcsirl.settings.runs import expert_run
 
 STEPS = 4_000
 
 
-def _actions(seeds: list[int], **changes: float) -> np.ndarray:
+def _explorers(seeds: list[int], share: float = 0.25) -> HeldExplorers:
+    return HeldExplorers(seeds, [share] * len(seeds), length=8, until=2_000)
+
+
+def _actions(seeds: list[int], share: float = 0.25) -> np.ndarray:
     """What becomes of actions that are all 9 [step, agent, 4]."""
-    settings = AgentRunSettings(held_share=0.25, held_steps=8, held_until=2_000).model_copy(update=changes)
-    explorers, taken = HeldExplorers(seeds, settings), np.full((STEPS, len(seeds), 4), 9.0, dtype=np.float32)
+    explorers, taken = _explorers(seeds, share), np.full((STEPS, len(seeds), 4), 9.0, dtype=np.float32)
     for step, action in enumerate(taken):
         explorers.replace(action, step)
     return taken
@@ -30,16 +33,15 @@ def test_a_share_of_all_blocks_holds_one_random_action():
 
 def test_none_after_the_end_and_none_without_a_share():
     assert (_actions([3])[2_000:] == 9.0).all()
-    assert (_actions([3], held_share=0.0) == 9.0).all()
+    assert (_actions([3], share=0.0) == 9.0).all()
 
 
 def test_neighbours_and_the_step_it_begins_with_change_nothing():
     alone, together = _actions([3]), _actions([5, 3])
     assert (alone[:, 0] == together[:, 1]).all()
     assert (together[:, 0] != together[:, 1]).any()
-    settings = AgentRunSettings(held_share=0.25, held_steps=8, held_until=2_000)
     action = np.full((1, 4), 9.0, dtype=np.float32)
-    resumed = HeldExplorers([3], settings)
+    resumed = _explorers([3])
     for step in range(1_003, 1_200):
         action[:] = 9.0
         resumed.replace(action, step)

@@ -8,8 +8,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from mtcsirl.settings.runs import AgentRunSettings
-
 _STREAM = 1_000_003
 """Keeps these random numbers apart from others drawn with the same seed and step."""
 
@@ -21,10 +19,9 @@ class HeldExplorers:
     other's alone.
     """
 
-    def __init__(self, seeds: Sequence[int], settings: AgentRunSettings) -> None:
-        """``held_share`` of the blocks of ``held_steps`` steps that begin before step ``held_until``."""
-        self._seeds, self._share = tuple(seeds), settings.held_share
-        self._length, self._until = settings.held_steps, settings.held_until
+    def __init__(self, seeds: Sequence[int], shares: Sequence[float], length: int, until: int) -> None:
+        """``shares``: which share of the blocks of ``length`` steps that begin before step ``until``, by agent."""
+        self._seeds, self._shares, self._length, self._until = tuple(seeds), tuple(shares), length, until
         self._block = -1
         self._held: dict[int, np.ndarray] = {}
 
@@ -37,7 +34,10 @@ class HeldExplorers:
             action[index] = held
 
     def _draw(self, block: int, size: int) -> dict[int, np.ndarray]:
-        if self._share == 0 or block * self._length >= self._until:
-            return {}
-        streams = [np.random.default_rng((seed, _STREAM, block)) for seed in self._seeds]
-        return {index: rng.uniform(-1.0, 1.0, size) for index, rng in enumerate(streams) if rng.random() < self._share}
+        held: dict[int, np.ndarray] = {}
+        if block * self._length < self._until:
+            for index, (seed, share) in enumerate(zip(self._seeds, self._shares, strict=True)):
+                stream = np.random.default_rng((seed, _STREAM, block))
+                if stream.random() < share:
+                    held[index] = stream.uniform(-1.0, 1.0, size)
+        return held

@@ -76,7 +76,8 @@ class TrainedAgent:
 
 def common_settings(settings: AgentRunSettings) -> AgentRunSettings:
     """``settings`` without what agents that train in lockstep may differ in: agents in one batch agree in the rest."""
-    own: dict[str, Any] = {"cs_weight": 0.0, "curriculum": False, "scripted_steps": 0, "scripted_noise": 0.0}
+    own: dict[str, Any] = {"cs_weight": 0.0, "curriculum": False}
+    own |= {"scripted_steps": 0, "scripted_noise": 0.0, "held_share": 0.0}
     sac = settings.sac.model_copy(update={"reward_scale": 1.0})
     return settings.model_copy(update={**own, "sac": sac})
 
@@ -84,14 +85,14 @@ def common_settings(settings: AgentRunSettings) -> AgentRunSettings:
 def shared_settings(jobs: Sequence[AgentJob]) -> AgentRunSettings:
     """The settings of agents that train in lockstep.
 
-    Raises UserError when they differ in more than reward scale, cs_weight, curriculum or scripted steps.
+    Raises UserError when they differ in more than reward scale, cs_weight, curriculum, scripted steps or held share.
     """
     first = common_settings(jobs[0].settings)
     for job in jobs:
         if common_settings(job.settings) != first:
             raise UserError(
                 f"{job.task}-t{job.target} s{job.seed}: agents in lockstep share all settings but reward_scale, "
-                "cs_weight, curriculum and scripted_steps; train it on its own"
+                "cs_weight, curriculum, scripted_steps and held_share; train it on its own"
             )
     return jobs[0].settings
 

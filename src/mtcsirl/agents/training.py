@@ -91,7 +91,8 @@ class Training:
             [job.settings.scripted_noise for job in jobs],
             self.settings.environment.observation,
         )
-        self._held = HeldExplorers(seeds, self.settings)
+        shares = [job.settings.held_share for job in jobs]
+        self._held = HeldExplorers(seeds, shares, self.settings.held_steps, self.settings.held_until)
         self._progress = Progress(self.settings.steps, log, events)
         self._log = log
 
