@@ -74,7 +74,7 @@ def _timed(call: Callable[[], Any]) -> Callable[[], float]:
 
 def _settings() -> IrlRunSettings:
     """The desk scale's, without warm-up so that every iteration has its discriminator updates."""
-    settings = irl_run(Settings(), "single_target", ())
+    settings = irl_run(Settings(), "single_target", (TASK,))
     return settings.model_copy(update={"irl": settings.irl.model_copy(update={"warm_up_iterations": 0})})
 
 

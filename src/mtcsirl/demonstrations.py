@@ -94,6 +94,11 @@ def load_demonstrations(files: Sequence[Path | str], *, episodes: int, observati
     return Demonstrations(tuple(loaded), Transitions(*(torch.stack(p) for p in zip(*loaded.values(), strict=True))))
 
 
+def task_of(file: Path | str) -> str:
+    """The task of a file of demonstrations; raises UserError as `load_demonstrations` does."""
+    return _member(file, read_parquet(file, COLUMNS))[0]
+
+
 def _member(file: Path | str, frame: pd.DataFrame) -> tuple[str, int]:
     found = sorted(set(zip(frame["task"], frame["target"].astype(int), strict=True)))
     if len(found) != 1:

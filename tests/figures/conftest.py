@@ -1,13 +1,7 @@
-import ctypes.util
-
 import pytest
 
 from mtcsirl.settings import Settings
 from tests.figures.made_up import made_up_data
-
-needs_osmesa = pytest.mark.skipif(
-    ctypes.util.find_library("OSMesa") is None, reason="rendering needs Debian's libosmesa6"
-)
 
 
 @pytest.fixture(scope="session")

@@ -13,7 +13,6 @@ from mtcsirl.figures import figure_8, figure_9
 from mtcsirl.figures.data import FigureData
 from mtcsirl.rendering import CameraPose, SceneRenderer, camera_pose
 from mtcsirl.settings import Settings
-from tests.figures.conftest import needs_osmesa
 
 SIZE = (320, 240)
 
@@ -33,7 +32,6 @@ def test_projection_worked_out_by_hand():
     np.testing.assert_allclose(pose.project(points, 200, 100), expected)
 
 
-@needs_osmesa
 @pytest.mark.parametrize("camera", ["corner2", "corner", "topview"])
 def test_goal_sphere_is_seen_where_it_projects_to(environment, camera):
     simulator = environment.simulator
@@ -66,7 +64,6 @@ def test_machine_without_osmesa_is_told_the_package():
     assert done.stdout.count("\n") == 1
 
 
-@needs_osmesa
 def test_sawyer_arrow_ends_between_the_fingers():
     picture, tip = figure_9.end_effector_scene()
     figure = figure_9.compose(picture, tip)
@@ -87,7 +84,6 @@ def test_setups_are_the_studys():
     assert not {task for task, _ in tasks.train} & {task for task, _ in tasks.test}
 
 
-@needs_osmesa
 def test_overview_shows_every_scene_once_where_it_belongs():
     settings = Settings(scale="smoke")
     shot = figure_8.shoot(("drawer-close", 0), 0)

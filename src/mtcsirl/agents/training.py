@@ -81,9 +81,8 @@ class Training:
         self._best: list[tuple[tuple[float, float, float], Policy] | None] = [None] * len(jobs)
         self._curves: list[list[tuple[int, str, float]]] = [[] for _ in jobs]
         self._checkpoint = None if checkpoint is None else Path(checkpoint)
-        self.environments: TaskEnvironments = make_environments(
-            [(job.task, job.target) for job in jobs], self.settings.environment, workers
-        )
+        tasks = [(job.task, job.target) for job in jobs]
+        self.environments: TaskEnvironments = make_environments(tasks, self.settings.environment, workers)
         self._scripted = ScriptedExplorers(
             [job.task for job in jobs],
             seeds,
@@ -174,8 +173,8 @@ class Training:
         self._scripted.replace(action, observation, self.step)
         return action
 
-    def _policy_action(self, seen: np.ndarray) -> np.ndarray:
-        return self.learner.act(torch.from_numpy(seen).to(self.learner.device)).cpu().numpy()
+    def _policy_action(self, observation: np.ndarray) -> np.ndarray:
+        return self.learner.act(torch.from_numpy(observation).to(self.learner.device)).cpu().numpy()
 
     def _update(self) -> None:
         """Catch up with updates_per_step gradient steps per environment step after the random ones."""

@@ -102,11 +102,14 @@ def _collect_demonstrations(verbs: Verbs) -> None:
 def _learn_reward(verbs: Verbs) -> None:
     def run(parsed: argparse.Namespace) -> None:
         from mtcsirl import stages
+        from mtcsirl.demonstrations import task_of
         from mtcsirl.settings.runs import IrlRunSettings, irl_run
-        from mtcsirl.tasks import TASKS
 
-        experiment = "multi_task" if len(parsed.demonstrations) > 1 else "single_target"
-        settings = run_settings(parsed, IrlRunSettings, lambda s: irl_run(s, experiment, TASKS))
+        files = parsed.demonstrations
+        experiment = "multi_task" if len(files) > 1 else "single_target"
+        settings = run_settings(
+            parsed, IrlRunSettings, lambda s: irl_run(s, experiment, [task_of(file) for file in files])
+        )
         stages.learn_reward(
             settings, parsed.method, parsed.cs_reward, parsed.demonstrations, parsed.seed, parsed.output
         )

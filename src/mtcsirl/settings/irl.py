@@ -2,6 +2,8 @@
 
 from typing import Literal
 
+from pydantic import Field
+
 from mtcsirl.settings.base import Frozen, key
 from mtcsirl.settings.learner import RewardScaleSettings, Temperature
 
@@ -104,13 +106,7 @@ class IrlAlgorithmSettings(Frozen):
 class IrlSettings(IrlAlgorithmSettings):
     """Algorithms 1 and 2 as one run has them."""
 
-    warm_up_iterations: int = key(
-        20,
-        "iterations on the task reward alone before IRL; methods that do not know it spend them on IRL too",
-        unit="iterations",
-        paper=0,
-        ge=0,
-    )
+    warm_up_iterations: int = Field(default=0, ge=0, description="that of the run's slowest task")
 
 
 class TransferSettings(RewardScaleSettings):

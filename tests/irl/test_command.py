@@ -1,0 +1,19 @@
+"""`mtcsirl learn-reward` on files of one's own: settings are those of the tasks demonstrated, not of all tasks."""
+
+from mtcsirl.cli import main
+from mtcsirl.storage import read_json
+from tests.irl.conftest import MEMBERS
+
+
+def test_a_run_has_the_settings_of_its_own_tasks(demonstrations, tmp_path):
+    overlay = tmp_path / "overlay.yaml"
+    overlay.write_text("irl: {warm_up_iterations: {push-back: 2}}\nexploration: {scripted_steps: {push-back: 50}}\n")
+    assert "push-back" not in [task for task, _ in MEMBERS]
+    files = [str(file) for file in demonstrations]
+    arguments = ["--method", "mt_csirl", "--cs-reward", "velocity", "--seed", "100", "--scale", "smoke"]
+    output = tmp_path / "run"
+    given = [*arguments, "--config", str(overlay), "--demonstrations", *files, "--output", str(output)]
+    assert main(["learn-reward", *given]) == 0
+    settings = read_json(output / "settings.json")
+    assert settings["irl"]["warm_up_iterations"] == 1
+    assert "push-back" not in settings["scripted_steps"]
