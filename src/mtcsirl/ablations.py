@@ -58,6 +58,7 @@ ABLATIONS: dict[str, Ablation] = {
         {
             "default": Variant("curriculum", {}),
             "constant": Variant("constant weight", {"expert": {"curriculum": False}, "irl": {"curriculum": False}}),
+            "task_maximum": Variant("curriculum, maximum 10", {"irl": {"curriculum_maximum": "task"}}, ("irl",)),
         },
     ),
     "ablation_observation": Ablation(

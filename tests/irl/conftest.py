@@ -48,7 +48,7 @@ def irl_settings(**irl) -> IrlRunSettings:
     settings = IrlSettings(**chosen)
     learner = LearnerSettings(hidden_sizes=(16, 16), minibatch=32, random_steps=30)
     return IrlRunSettings(
-        sac=settings.reward_scale().sac(learner),
+        sac=settings.scaling().sac(learner),
         irl=settings,
         demonstration_episodes=2,
         evaluation=EvaluationSettings(episodes=1, episode_steps=60),

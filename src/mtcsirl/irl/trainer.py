@@ -1,16 +1,18 @@
 """Algorithms 1 and 2: generators and discriminators in turn, T tasks in one process."""
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 
 import numpy as np
 import torch
 from torch import Tensor
 
+from mtcsirl.agents.checkpoint import prefixed, without_prefix
 from mtcsirl.agents.learners import make_learner
 from mtcsirl.agents.lockstep import Outcome
 from mtcsirl.agents.replay import Replay
 from mtcsirl.agents.scripted import ScriptedExplorers
-from mtcsirl.irl.curriculum import Curriculum
+from mtcsirl.irl.curriculum import R_MAX, Curriculum
 from mtcsirl.irl.densities import Densities
 from mtcsirl.irl.diagnostics import (
     Row,
@@ -60,7 +62,8 @@ class IrlTrainer:
         self.sac = make_learner(tasks, self._first_sac(), seeds, observation_size=state, action_size=action)
         capacity = min(self.irl.generator_memory, self.iterations * steps)
         self.replay = Replay(tasks, capacity, seed=replayed, observation_size=state, action_size=action)
-        self.curriculum = Curriculum(tasks, self.irl.curriculum_window)
+        maximum = R_MAX if self.irl.curriculum_maximum == "task" else demonstrations.task_reward.mean(dim=1)
+        self.curriculum = Curriculum(tasks, self.irl.curriculum_window, maximum)
         mixed = self.irl.generator_replay if self.irl.logit_density == "mixture" else 1
         self._densities = Densities(demonstrations, settings.sac, policies=mixed, steps=steps)
         self._policies_mixed = mixed
@@ -92,7 +95,8 @@ class IrlTrainer:
             self._note_discriminators(self._update_discriminators())
         for _ in range(self.irl.generator_updates):
             sample = self.replay.sample(self.settings.sac.minibatch)
-            self.sac.update(sample.observation, sample.action, self.policy_reward(sample), sample.next_observation)
+            reward = self.settings.sac.reward_scale * self.policy_reward(sample)
+            self.sac.update(sample.observation, sample.action, reward, sample.next_observation)
         self._note_generators(self.replay.latest(steps), success)
         self.iteration += 1
         if self.iteration == self.irl.warm_up_iterations:
@@ -123,6 +127,11 @@ class IrlTrainer:
     def _scripted_rollouts(self) -> int:
         """How many of the first rollouts hold scripted actions of any generator."""
         return -(-int(self._scripted.steps.max()) // self.irl.steps_per_iteration)
+
+    @property
+    def temperature(self) -> Tensor:
+        """The entropy temperature of each generator [T], in units of the policy reward."""
+        return self.sac.temperature / self.settings.sac.reward_scale
 
     # --- generators ---------------------------------------------------------------------------------------------
 
@@ -211,7 +220,7 @@ class IrlTrainer:
 
     def _batches(self, count: int, minibatch: int) -> list[Batch]:
         """``count`` minibatches of expert and generator transitions [T, minibatch] with their log pi."""
-        temperature = self.sac.temperature.unsqueeze(1)
+        temperature = self.temperature.unsqueeze(1)
         if self.irl.logit_temperature == "as_printed":
             temperature = torch.ones_like(temperature)
         sides = []
@@ -254,7 +263,7 @@ class IrlTrainer:
         """Rows on the episodes and on the generators' learning."""
         members, start = self.world.members, self.iteration * self.irl.steps_per_iteration
         self.curve += episode_rows(self.world, rollout, success, start, self.settings.evaluation.episode_steps)
-        learning = self.sac.metrics() | {"temperature": self.sac.temperature, "curriculum": self.alpha()}
+        learning = self.sac.metrics() | {"temperature": self.temperature, "curriculum": self.alpha()}
         for metric in ("temperature", "curriculum"):
             self.curve += rows_per_task(members, self._steps_after, metric, learning[metric])
         for metric, values in learning.items():
@@ -262,7 +271,7 @@ class IrlTrainer:
 
     def state(self) -> dict[str, Tensor]:
         """Everything that an exact resume between two iterations needs, as named tensors."""
-        parts: dict[str, Mapping[str, Tensor]] = {
+        parts: dict[str, dict[str, Tensor]] = {
             "sac": self.sac.state_dict(),
             "replay": self.replay.state_dict(),
             "curriculum": self.curriculum.state(),
@@ -270,27 +279,21 @@ class IrlTrainer:
             "trainer": {"random": self._random.get_state(), "iteration": torch.tensor(self.iteration)},
         }
         parts |= {f"discriminator_{name}": one.state() for name, one in self.method.discriminators.items()}
-        return {f"{part}.{name}": tensor for part, state in parts.items() for name, tensor in state.items()}
+        return {name: tensor for part, state in parts.items() for name, tensor in prefixed(part, state).items()}
 
     def load_state(self, state: Mapping[str, Tensor]) -> None:
         """Restore what ``state`` gave; the rows in ``curve`` and ``diagnostics`` are the caller's to restore."""
-        part = _parts(state)
-        self.iteration = int(part["trainer"]["iteration"])
+        part = partial(without_prefix, tensors=dict(state))
+        trainer = part("trainer")
+        self.iteration = int(trainer["iteration"])
         if not self._warming_up:
             self._fix_temperature()
-        self.sac.load_state_dict(part["sac"])
-        self.replay.load_state_dict(part["replay"])
+        self.sac.load_state_dict(part("sac"))
+        self.replay.load_state_dict(part("replay"))
+        curriculum = part("curriculum")
         for name, tensor in self.curriculum.state().items():
-            tensor.copy_(part["curriculum"][name])
-        self._densities.load_state(part.get("densities", {}))
-        self._random.set_state(part["trainer"]["random"])
+            tensor.copy_(curriculum[name])
+        self._densities.load_state(part("densities"))
+        self._random.set_state(trainer["random"])
         for name, discriminator in self.method.discriminators.items():
-            discriminator.load_state(part[f"discriminator_{name}"])
-
-
-def _parts(state: Mapping[str, Tensor]) -> dict[str, dict[str, Tensor]]:
-    parts: dict[str, dict[str, Tensor]] = {}
-    for name, tensor in state.items():
-        part, _, rest = name.partition(".")
-        parts.setdefault(part, {})[rest] = tensor
-    return parts
+            discriminator.load_state(part(f"discriminator_{name}"))

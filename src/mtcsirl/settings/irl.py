@@ -63,6 +63,12 @@ class IrlAlgorithmSettings(Frozen):
     )
     curriculum: bool = key(True, "weight f in the policy reward by r_ave / R_MAX", paper=True)
     curriculum_window: int = key(256, "window of r_ave", unit="environment steps", paper=256, gt=0)
+    curriculum_maximum: Literal["experts", "task"] = key(
+        "experts",
+        "R_MAX of the curriculum: what a task's experts earn per step, or 10, the most that it pays; with 10, f counts"
+        " too little to keep a generator at an expert that earns less",
+        paper="task",
+    )
     unknown_task_curriculum: bool = key(
         False,
         "MT-CSIRL+LT: take r_ave of the curriculum from the environment, though the method does not know it",
@@ -89,6 +95,13 @@ class IrlAlgorithmSettings(Frozen):
     )
     temperature: Temperature = key(1.0, "generators: automatic or fixed entropy temperature", paper="automatic")
     initial_temperature: float = key(0.05, "generators: start of the automatic temperature", gt=0)
+    reward_scale: float = key(
+        0.1,
+        "generators: factor on reward and temperature inside SAC: no policy is better or worse for it, but the critics'"
+        " targets are small, as in every other agent",
+        paper=1.0,
+        gt=0,
+    )
     warm_up_temperature: Literal["automatic", "as_in_irl"] = key(
         "automatic",
         "generators in their warm-up: automatic, as plain SAC, or that of IRL; at temperature 1 the entropy bonus hides"
@@ -96,10 +109,13 @@ class IrlAlgorithmSettings(Frozen):
     )
     discriminator: DiscriminatorSettings = key(DiscriminatorSettings, "the learned reward")
 
-    def reward_scale(self) -> RewardScaleSettings:
-        """Temperature and scale of the generators' SAC."""
+    def scaling(self) -> RewardScaleSettings:
+        """Temperature and scale of the generators' SAC: scaled together, they leave the optimal policy as it is."""
+        scale, fixed = self.reward_scale, self.temperature != "automatic"
         return RewardScaleSettings(
-            temperature=self.temperature, initial_temperature=self.initial_temperature, reward_scale=1.0
+            temperature=scale * float(self.temperature) if fixed else "automatic",
+            initial_temperature=scale * self.initial_temperature,
+            reward_scale=scale,
         )
 
 

@@ -144,7 +144,7 @@ def irl_run(settings: Settings, experiment: str, tasks: Collection[str]) -> IrlR
     scripted = {task: steps for task, steps in settings.exploration.scripted_steps.items() if task in tasks and steps}
     return IrlRunSettings(
         environment=settings.environment,
-        sac=settings.irl.reward_scale().sac(settings.sac),
+        sac=settings.irl.scaling().sac(settings.sac),
         irl=_irl(settings, tasks),
         scripted_steps=scripted,
         scripted_noise=settings.exploration.scripted_noise if scripted else 0.0,

@@ -67,6 +67,7 @@ class ValidationSettings:
             generator_replay=10,
             curriculum=False,
             temperature=1.0,
+            reward_scale=1.0,
             discriminator=DiscriminatorSettings(
                 hidden_sizes=(64, 64),
                 learning_rate=self.learning_rate,
@@ -85,7 +86,7 @@ class ValidationSettings:
             random_steps=400,
         )
         evaluation = EvaluationSettings(episodes=1, episode_steps=EPISODE_STEPS)
-        return IrlRunSettings(sac=irl.reward_scale().sac(learner), irl=irl, evaluation=evaluation)
+        return IrlRunSettings(sac=irl.scaling().sac(learner), irl=irl, evaluation=evaluation)
 
 
 class Findings(NamedTuple):
