@@ -49,7 +49,13 @@ def test_neighbours_and_the_step_it_begins_with_change_nothing():
 
 
 def test_experts_hold_until_a_share_of_their_budget():
-    settings = load(overrides=["expert.held_share={velocity: 0.1, action_norm: 0.0}", "expert.held_until=0.5"])
+    settings = load(
+        overrides=[
+            "expert.held_share={velocity: {default: 0.1}, action_norm: {default: 0.0, reach: 0.2}}",
+            "expert.held_until=0.5",
+        ]
+    )
     own = expert_run(settings, "push-back", "velocity")
     assert (own.held_share, own.held_until) == (0.1, own.steps // 2)
     assert expert_run(settings, "push-back", "action_norm").held_share == 0.0
+    assert expert_run(settings, "reach", "action_norm").held_share == 0.2

@@ -1,6 +1,7 @@
 """Task names, and numbers that are granted to every task but differ for some."""
 
-from typing import Annotated
+from collections.abc import Mapping
+from typing import Annotated, TypeVar
 
 from pydantic import AfterValidator, Field
 
@@ -16,7 +17,10 @@ def known_task(name: str) -> str:
     return name
 
 
-def known_keys(budget: dict[str, int]) -> dict[str, int]:
+Number = TypeVar("Number", int, float)
+
+
+def known_keys(budget: dict[str, Number]) -> dict[str, Number]:
     """``budget``, or ValueError: no default or an unknown task."""
     if "default" not in budget:
         raise ValueError("needs the key 'default'")
@@ -31,8 +35,10 @@ Budget = Annotated[dict[str, Annotated[int, Field(gt=0)]], AfterValidator(known_
 """Environment steps: the key ``default`` and one key per task that differs."""
 Iterations = Annotated[dict[str, Annotated[int, Field(ge=0)]], AfterValidator(known_keys)]
 """Iterations of IRL, likewise; none is allowed."""
+Shares = Annotated[dict[str, Annotated[float, Field(ge=0, le=1)]], AfterValidator(known_keys)]
+"""Shares in [0, 1], likewise."""
 
 
-def granted(budget: dict[str, int], task: str) -> int:
+def granted(budget: Mapping[str, Number], task: str) -> Number:
     """What ``budget`` grants to ``task``."""
     return budget.get(task, budget["default"])

@@ -107,7 +107,7 @@ def expert_run(settings: Settings, task: str, cs_reward: str) -> AgentRunSetting
         warm_up_success=expert.warm_up_success,
         warm_up_episodes=expert.warm_up_episodes,
         warm_up_steps=granted(expert.warm_up_steps, task),
-        held_share=expert.held_share.get(cs_reward, 0.0),
+        held_share=granted(expert.held_share.get(cs_reward, {"default": 0.0}), task),
         held_steps=expert.held_steps,
         held_until=int(expert.held_until * granted(expert.steps, task)),
     )

@@ -9,7 +9,7 @@ from mtcsirl.extensions import load_extensions
 from mtcsirl.irl.methods import METHODS as METHOD_REGISTRY
 from mtcsirl.rewards.ground_truth import COMMON_SENSE_REWARDS
 from mtcsirl.settings.base import Frozen, key
-from mtcsirl.settings.budgets import Budget, Iterations, Task
+from mtcsirl.settings.budgets import Budget, Iterations, Shares, Task
 from mtcsirl.settings.irl import IrlAlgorithmSettings, ScoreSettings, TransferSettings
 from mtcsirl.settings.learner import (
     EnvironmentSettings,
@@ -152,16 +152,16 @@ class ExpertSettings(RewardScaleSettings):
     cs_weight_factor: dict[CsReward, dict[Task, Annotated[float, Field(gt=0)]]] = key(
         lambda: {
             "velocity": {"coffee-button": 2.0, "plate-slide": 1.5},
-            "action_norm": {"plate-slide": 2.0},
+            "action_norm": {"coffee-button": 3.0, "plate-slide": 2.0},
         },
         "factor on cs_weight per task: more where the task pays for staying where it is done",
     )
-    held_share: dict[CsReward, Annotated[float, Field(ge=0, le=1)]] = key(
-        lambda: {"velocity": 0.1, "action_norm": 0.0},
+    held_share: dict[CsReward, Shares] = key(
+        lambda: {"velocity": {"default": 0.1}, "action_norm": {"default": 0.0, "coffee-button": 0.1}},
         "share of blocks of held_steps steps in which the agent holds one random action: frees a hand that does its"
         " task slowly and sees no gradient towards doing it fast",
         unit="share",
-        paper={"velocity": 0.0, "action_norm": 0.0},
+        paper={"velocity": {"default": 0.0}, "action_norm": {"default": 0.0, "coffee-button": 0.0}},
     )
     held_steps: int = key(
         16, "length of a block; the hand needs 8 steps to its full speed", unit="environment steps", gt=0
