@@ -55,7 +55,7 @@ def test_experts_hold_until_a_share_of_their_budget():
             "expert.held_until=0.5",
         ]
     )
-    own = expert_run(settings, "push-back", "velocity")
+    own = expert_run(settings, "window-open", "velocity")
     assert (own.held_share, own.held_until) == (0.1, own.steps // 2)
     assert expert_run(settings, "push-back", "action_norm").held_share == 0.0
     assert expert_run(settings, "reach", "action_norm").held_share == 0.2

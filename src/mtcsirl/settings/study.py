@@ -157,11 +157,17 @@ class ExpertSettings(RewardScaleSettings):
         "factor on cs_weight per task: more where the task pays for staying where it is done",
     )
     held_share: dict[CsReward, Shares] = key(
-        lambda: {"velocity": {"default": 0.1}, "action_norm": {"default": 0.0, "coffee-button": 0.1}},
+        lambda: {
+            "velocity": {"default": 0.1, "push-back": 0.0},
+            "action_norm": {"default": 0.0, "coffee-button": 0.1},
+        },
         "share of blocks of held_steps steps in which the agent holds one random action: frees a hand that does its"
         " task slowly and sees no gradient towards doing it fast",
         unit="share",
-        paper={"velocity": {"default": 0.0}, "action_norm": {"default": 0.0, "coffee-button": 0.0}},
+        paper={
+            "velocity": {"default": 0.0, "push-back": 0.0},
+            "action_norm": {"default": 0.0, "coffee-button": 0.0},
+        },
     )
     held_steps: int = key(
         16, "length of a block; the hand needs 8 steps to its full speed", unit="environment steps", gt=0
