@@ -76,7 +76,7 @@ def test_generators_are_paid_by_the_reward_of_this_moment(demonstrations) -> Non
     sample = trainer.replay.sample(64)
     f = trainer.method.discriminators["f"].network
     alpha = trainer.curriculum.weight()
-    latest = trainer.replay.latest(120).task_reward  # 120 steps, fewer than the window of 256: all count
+    latest = trainer.replay.latest(120).task_reward  # 120 steps, fewer than the window: all count
     torch.testing.assert_close(alpha, latest.mean(dim=1) / 10)
     centre = f(trainer.replay.latest(120)).mean(dim=1)
     expected = sample.task_reward + alpha[:, None] * (f(sample) - centre[:, None])

@@ -62,7 +62,13 @@ class IrlAlgorithmSettings(Frozen):
         "batched", "loop over tasks as printed, or one tensor program over all tasks", paper="as_printed"
     )
     curriculum: bool = key(True, "weight f in the policy reward by r_ave / R_MAX", paper=True)
-    curriculum_window: int = key(256, "window of r_ave", unit="environment steps", paper=256, gt=0)
+    curriculum_window: int = key(
+        2_560,
+        "window of r_ave; over 256 steps, half an episode, one failed rollout takes f away from its generator",
+        unit="environment steps",
+        paper=256,
+        gt=0,
+    )
     curriculum_maximum: Literal["experts", "task"] = key(
         "experts",
         "R_MAX of the curriculum: what a task's experts earn per step, or 10, the most that it pays; with 10, f counts"
