@@ -21,7 +21,9 @@ class HeldExplorers:
 
     def __init__(self, seeds: Sequence[int], shares: Sequence[float], length: int, until: int) -> None:
         """``shares``: which share of the blocks of ``length`` steps that begin before step ``until``, by agent."""
-        self._seeds, self._shares, self._length, self._until = tuple(seeds), tuple(shares), length, until
+        agents = enumerate(zip(seeds, shares, strict=True))
+        self._agents = [(index, seed, share) for index, (seed, share) in agents if share > 0]
+        self._length, self._until = length, until
         self._block = -1
         self._held: dict[int, np.ndarray] = {}
 
@@ -36,7 +38,7 @@ class HeldExplorers:
     def _draw(self, block: int, size: int) -> dict[int, np.ndarray]:
         held: dict[int, np.ndarray] = {}
         if block * self._length < self._until:
-            for index, (seed, share) in enumerate(zip(self._seeds, self._shares, strict=True)):
+            for index, seed, share in self._agents:
                 stream = np.random.default_rng((seed, _STREAM, block))
                 if stream.random() < share:
                     held[index] = stream.uniform(-1.0, 1.0, size)
