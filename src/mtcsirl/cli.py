@@ -13,7 +13,7 @@ from types import FrameType
 from typing import NoReturn
 
 from mtcsirl import __version__
-from mtcsirl.commands import artefacts, export, stages, study, together, validate, video
+from mtcsirl.commands import artefacts, diagnostics, export, stages, study, together, validate, video
 from mtcsirl.errors import UserError
 from mtcsirl.extensions import load_from_environment
 
@@ -37,7 +37,7 @@ def parser() -> Parser:
     )
     root.add_argument("--version", action="version", version=__version__)
     verbs = root.add_subparsers(metavar="VERB", required=True)
-    for group in (stages, together, artefacts, study, video, export, validate):
+    for group in (stages, together, artefacts, diagnostics, study, video, export, validate):
         group.register(verbs)
     return root
 

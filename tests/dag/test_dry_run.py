@@ -26,6 +26,15 @@ def test_an_ablation_plans_its_runs_by_the_rules_of_the_main_study(snakemake: Sn
     assert dry_run(snakemake, "desk", target) == design(load(scale="desk"), target).jobs() | {target: 1}
 
 
+def test_diagnostics_needs_irl_runs_and_what_they_need_alone(snakemake: Snakemake) -> None:
+    planned, jobs = dry_run(snakemake, "desk", "diagnostics"), design(load(scale="desk")).jobs()
+    runs = jobs["learn_reward"]
+    assert planned["learn_reward"] == planned["draw_diagnostics"] == runs
+    assert planned.keys() == {
+        "train_expert", "collect_demonstrations", "learn_reward", "draw_diagnostics", "diagnostics"
+    }  # fmt: skip
+
+
 @pytest.mark.parametrize("scale", ["smoke", "desk", "paper"])
 def test_all_is_the_whole_study_with_every_artefact(snakemake: Snakemake, scale: str) -> None:
     planned = dry_run(snakemake, scale)

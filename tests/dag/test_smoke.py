@@ -243,6 +243,23 @@ def test_a_table_of_partial_results_marks_what_is_missing(
     assert "missing" in (tmp_path / "table_2.md").read_text().lower()
 
 
+def test_every_irl_run_is_drawn_and_diagnosed(
+    smoke: Path, snakemake: Snakemake, results: Path, figures: Path, study: Study
+) -> None:
+    done = snakemake("--cores", "2", "diagnostics", *SMOKE)
+    assert done.returncode == 0, done.stderr[-3000:]
+    for run in study.irl_runs:
+        assert (figures / "diagnostics" / run.folder).with_suffix(".png").stat().st_size > 20_000, run.folder
+    rows = pd.read_csv(results / "diagnostics/diagnostics.csv")
+    per_run = rows.groupby(["experiment", "method", "cs_reward", "source", "seed"]).size()
+    assert len(per_run) == len(study.irl_runs)
+    for run in study.irl_runs:
+        discriminators = 2 if run.method == "mt_csirl_lt" else 1
+        found = per_run[(run.experiment, run.method, run.cs_reward, run.source, run.seed)]
+        assert found == discriminators * len(run.members)
+    assert NOTE in (results / "diagnostics/diagnostics.md").read_text()
+
+
 @needs_rendering
 def test_snakemakes_own_report(smoke: Path, snakemake: Snakemake, tmp_path: Path) -> None:
     done = snakemake("all", *SMOKE, "--report", str(tmp_path / "report.zip"))

@@ -6,12 +6,11 @@ from typing import TYPE_CHECKING
 
 from mtcsirl.ablations import ABLATIONS
 from mtcsirl.commands.arguments import Verbs, add_study_settings, add_verb, study_settings
+from mtcsirl.commands.drawing import write_figure
 from mtcsirl.design import ARTEFACTS, design
 from mtcsirl.settings import Settings
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from mtcsirl.analysis.claims import Finding
 
 HEAT_MAPS = {"table_1": "action_norm", "table_3": "velocity"}
@@ -83,7 +82,7 @@ def _table(parsed: argparse.Namespace) -> None:
         from mtcsirl.tables.heatmaps import heat_map, heat_map_caption
 
         cs_reward = HEAT_MAPS[name]
-        _write_figure(folder / name, heat_map(cs_reward, rows, settings), heat_map_caption(cs_reward, settings))
+        write_figure(folder / name, heat_map(cs_reward, rows, settings), heat_map_caption(cs_reward, settings))
     print(table.markdown())
 
 
@@ -100,7 +99,7 @@ def _figure(parsed: argparse.Namespace) -> None:
     spec = figure_spec(name)
     data = FigureData(settings=settings, **frames)
     figure, caption = spec.draw(data), spec.caption(data)
-    _write_figure((parsed.output or Path(settings.figures)) / name, figure, caption)
+    write_figure((parsed.output or Path(settings.figures)) / name, figure, caption)
     print(f"{spec.title}. {caption}")
 
 
@@ -133,17 +132,8 @@ def _ablation(parsed: argparse.Namespace) -> None:
     rows = variant_rows(frames)
     write_csv((parsed.output or Path(settings.results) / "ablations") / f"{name}.csv", rows)
     text = caption(name, rows, settings)
-    _write_figure((parsed.figures or Path(settings.figures)) / name, draw(name, rows, settings), text)
+    write_figure((parsed.figures or Path(settings.figures)) / name, draw(name, rows, settings), text)
     print(text)
-
-
-def _write_figure(path: Path, figure: "Figure", caption: str) -> None:
-    """Write ``path``.pdf and .png."""
-    from mtcsirl.figures.style import figure_bytes
-    from mtcsirl.storage import write_bytes
-
-    write_bytes(path.with_suffix(".pdf"), figure_bytes(figure, "pdf", caption))
-    write_bytes(path.with_suffix(".png"), figure_bytes(figure, "png", caption))
 
 
 def _claims(parsed: argparse.Namespace) -> None:
@@ -157,7 +147,7 @@ def _claims(parsed: argparse.Namespace) -> None:
     text = claims_markdown(findings, settings)
     write_json(folder / "claims.json", claims_json(findings, settings))
     write_text(folder / "claims.md", text)
-    _write_figure(folder / "claims", claims_figure(findings, settings), CAPTION)
+    write_figure(folder / "claims", claims_figure(findings, settings), CAPTION)
     print(text)
 
 

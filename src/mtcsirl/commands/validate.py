@@ -4,6 +4,7 @@ import argparse
 from pathlib import Path
 
 from mtcsirl.commands.arguments import Verbs, add_output, add_verb, natural
+from mtcsirl.commands.drawing import write_figure
 
 
 def register(verbs: Verbs) -> None:
@@ -22,8 +23,7 @@ def register(verbs: Verbs) -> None:
 
 
 def _validate(parsed: argparse.Namespace) -> None:
-    from mtcsirl.figures.style import figure_bytes
-    from mtcsirl.storage import write_bytes, write_csv
+    from mtcsirl.storage import write_csv
     from mtcsirl.validation.figure import caption, draw
     from mtcsirl.validation.study import ValidationSettings, validate
 
@@ -31,6 +31,5 @@ def _validate(parsed: argparse.Namespace) -> None:
     for name, frame in findings._asdict().items():
         write_csv(parsed.output / f"{name}.csv", frame)
     figure, text = draw(findings), caption(findings)
-    write_bytes(parsed.figures / "validation.pdf", figure_bytes(figure, "pdf", text))
-    write_bytes(parsed.figures / "validation.png", figure_bytes(figure, "png", text))
+    write_figure(parsed.figures / "validation", figure, text)
     print(text)

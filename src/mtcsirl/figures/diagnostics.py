@@ -1,0 +1,125 @@
+"""What one IRL run logged, iteration by iteration: generators in the first two rows, each discriminator in one more."""
+
+from collections.abc import Sequence
+
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from mtcsirl.figures.style import (
+    TARGET_COLOUR,
+    add_notes,
+    empty_panel,
+    new_figure,
+    panel_title,
+    quantity_label,
+    scale_notes,
+    styled,
+    target_of,
+)
+
+CURVE_COLUMNS = ("task", "target", "step", "metric", "value")
+DIAGNOSTIC_COLUMNS = ("task", "target", "step", "discriminator", "metric", "value")
+"""What is read of curve.csv and diagnostics.csv."""
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#222222", "#8C6D31")
+"""One per task and target in their order, Okabe-Ito; the ninth begins anew."""
+EXPERT, GENERATOR = (0, (3, 1)), "-"
+WIDTH, PANEL_HEIGHT = 7.5, 1.45
+WINDOW = 5
+"""Iterations of the centred running mean: single rollouts and minibatches hide the trend."""
+
+Panel = tuple[str, tuple[tuple[str, str | tuple[int, tuple[int, ...]]], ...], str]
+"""Title, metrics with their line style, label of the value axis."""
+GENERATOR_PANELS: tuple[Panel, ...] = (
+    ("success", (("success", "-"),), "share of episodes"),
+    ("task reward", (("task_reward", "-"),), "per step"),
+    ("curriculum", (("curriculum", "-"),), r"$\alpha$"),
+    ("log π", (("log_pi_expert_q50", EXPERT), ("log_pi_generator_q50", GENERATOR)), "nats"),
+    ("temperature", (("temperature", "-"),), "reward units"),
+    ("critics", (("critic_gradient_norm", "-"),), "gradient norm"),
+    ("actor", (("actor_gradient_norm", "-"),), "gradient norm"),
+)
+DISCRIMINATOR_PANELS: tuple[Panel, ...] = (
+    ("accuracy", (("accuracy_expert", EXPERT), ("accuracy_generator", GENERATOR)), "share right"),
+    ("loss", (("cross_entropy", "-"),), "cross-entropy (nats)"),
+    ("reward", (("f_expert_mean", EXPERT), ("f_generator_mean", GENERATOR)), "mean"),
+    ("step", (("gradient_norm", "-"),), "gradient norm"),
+)
+ENDS = ("q05", "q95")
+CHANCE = {"accuracy": 0.5, "loss": 1.3863}
+"""Where a discriminator that tells nothing apart is: half right, 2 log 2."""
+
+
+@styled
+def draw(curve: pd.DataFrame, diagnostics: pd.DataFrame, cs_reward: str, title: str, scale: str) -> Figure:
+    """Panels over environment steps per generator; one colour per task and target.
+
+    ``curve`` and ``diagnostics`` as an IRL run writes them.
+    """
+    members = list(dict.fromkeys(zip(curve["task"], curve["target"], strict=True)))
+    names = list(diagnostics["discriminator"].dropna().unique())
+    rows = 2 + len(names)
+    figure = new_figure(WIDTH, 0.7 + PANEL_HEIGHT * rows)
+    figure.suptitle(title)
+    grid = figure.subplots(rows, 4, sharex=True)
+    behaviour: Panel = ("behaviour", ((cs_reward, "-"),), quantity_label(cs_reward))
+    panels = [(panel, "") for panel in (behaviour, *GENERATOR_PANELS)]
+    panels += [(panel, name) for name in names for panel in DISCRIMINATOR_PANELS]
+    both = pd.concat([curve.assign(discriminator=None), _only_in(diagnostics, curve)], ignore_index=True)
+    for index, (axes, (panel, name)) in enumerate(zip(grid.flat, panels, strict=True)):
+        own = both[both["discriminator"].fillna("") == name]
+        _draw_panel(axes, panel, own, members)
+        panel_title(axes, index, f"{name}: {panel[0]}" if name else panel[0])
+        if panel is behaviour:
+            axes.axhline(target_of(cs_reward), color=TARGET_COLOUR, linewidth=0.8)
+    for axes in grid[-1]:
+        axes.set_xlabel("environment steps")
+        axes.xaxis.set_major_formatter(lambda step, _: f"{step / 1000:g}k" if step else "0")
+    handles, labels = grid[0, 0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=min(3, len(labels)))
+    add_notes(figure, scale_notes(scale))
+    return figure
+
+
+def _only_in(diagnostics: pd.DataFrame, curve: pd.DataFrame) -> pd.DataFrame:
+    """Diagnostics without what the curve has too."""
+    return diagnostics[~diagnostics["metric"].isin(curve["metric"].unique())]
+
+
+def _draw_panel(axes: Axes, panel: Panel, rows: pd.DataFrame, members: Sequence[tuple[str, int]]) -> None:
+    title, metrics, label = panel
+    axes.set_ylabel(label)
+    if rows.loc[rows["metric"].isin([name for name, _ in metrics]), "value"].notna().sum() == 0:
+        empty_panel(axes, "not logged by this method")
+        return
+    for number, (task, target) in enumerate(members):
+        of_member = rows[(rows["task"] == task) & (rows["target"] == target)]
+        for metric, style in metrics:
+            own = of_member[of_member["metric"] == metric].sort_values("step")
+            smooth = own["value"].rolling(WINDOW, center=True, min_periods=1).mean()
+            name = f"{task}, target {target}" if style == metrics[-1][1] else None
+            axes.plot(
+                own["step"], smooth, color=COLOURS[number % len(COLOURS)], linestyle=style, label=name, linewidth=1
+            )
+        if title == "log π":
+            _draw_range(axes, of_member, COLOURS[number % len(COLOURS)])
+    if title in CHANCE:
+        axes.axhline(CHANCE[title], color="0.5", linewidth=0.8, linestyle=":")
+    if title in ("accuracy", "success"):
+        axes.set_ylim(-0.03, 1.03)
+
+
+def _draw_range(axes: Axes, rows: pd.DataFrame, colour: str) -> None:
+    """The middle 90 % of log pi on the generator's transitions as a faint band."""
+    wide = rows.pivot_table(index="step", columns="metric", values="value")
+    low, high = (wide[f"log_pi_generator_{end}"].rolling(WINDOW, center=True, min_periods=1).mean() for end in ENDS)
+    axes.fill_between(wide.index, low, high, color=colour, alpha=0.08, linewidth=0)
+
+
+def caption(title: str) -> str:
+    """What the figure shows."""
+    return (
+        f"{title}. Running means over {WINDOW} iterations, one colour per task and target; dashed: the experts', "
+        "solid: the generator's transitions; dotted: a discriminator that tells nothing apart; red: the target. "
+        "log π: medians; band: the middle 90 % of the generator's. Temperature in units of the reward."
+    )
