@@ -43,6 +43,7 @@ def test_round_trips(tmp_path: Path) -> None:
     pd.testing.assert_frame_equal(storage.read_csv(tmp_path / "a.csv"), FRAME, check_dtype=False)
     storage.write_parquet(tmp_path / "a.parquet", FRAME)
     pd.testing.assert_frame_equal(storage.read_parquet(tmp_path / "a.parquet"), FRAME, check_dtype=False)
+    assert list(storage.read_parquet(tmp_path / "a.parquet", ("value",)).columns) == ["value"]
     storage.write_tensors(tmp_path / "a.safetensors", TENSORS)
     read = storage.read_tensors(tmp_path / "a.safetensors")
     assert all(torch.equal(read[name], tensor) for name, tensor in TENSORS.items())

@@ -95,8 +95,12 @@ def load_demonstrations(files: Sequence[Path | str], *, episodes: int, observati
 
 
 def task_of(file: Path | str) -> str:
-    """The task of a file of demonstrations; raises UserError as `load_demonstrations` does."""
-    return _member(file, read_parquet(file, COLUMNS))[0]
+    """The task of a file of demonstrations, whose transitions are not read.
+
+    Raises:
+        UserError: the file is missing, truncated, or holds several tasks or targets.
+    """
+    return _member(file, read_parquet(file, ("task", "target")))[0]
 
 
 def _member(file: Path | str, frame: pd.DataFrame) -> tuple[str, int]:

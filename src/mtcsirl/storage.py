@@ -109,10 +109,15 @@ def write_parquet(path: Path | str, frame: "pd.DataFrame") -> None:
 
 
 def read_parquet(path: Path | str, columns: tuple[str, ...] = ()) -> "pd.DataFrame":
-    """Read a Parquet frame and check that ``columns`` are there."""
+    """Read a Parquet frame, of it ``columns`` alone where named, and check that they are there."""
     import pandas as pd
+    from pyarrow.parquet import read_schema
 
-    return _with_columns(path, _read(path, pd.read_parquet, "Parquet file"), columns)
+    def parse(p: Path) -> "pd.DataFrame":
+        present = [name for name in read_schema(p).names if name in columns]
+        return pd.read_parquet(p, columns=present if columns else None)
+
+    return _with_columns(path, _read(path, parse, "Parquet file"), columns)
 
 
 def _with_columns(path: Path | str, frame: "pd.DataFrame", columns: tuple[str, ...]) -> "pd.DataFrame":
