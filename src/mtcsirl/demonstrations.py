@@ -14,6 +14,7 @@ import torch
 from mtcsirl.agents.policy import Policy
 from mtcsirl.environments import ACTION_SIZE, OBSERVATION_MAPS, OBSERVATION_SIZE, make_environment
 from mtcsirl.errors import UserError
+from mtcsirl.evaluation import measure_episode
 from mtcsirl.settings.runs import DemonstrationRunSettings
 from mtcsirl.storage import read_parquet
 from mtcsirl.transitions import Transitions
@@ -42,6 +43,16 @@ def collect_demonstrations(
             observation = after
     environment.close()
     return pd.DataFrame(rows, columns=list(COLUMNS))
+
+
+def demonstrated(frame: pd.DataFrame) -> dict[str, float]:
+    """Means over the episodes of a frame with ``COLUMNS``: success, the measure of every cs-reward, task_reward."""
+    episodes = []
+    for _, rows in frame.groupby("episode"):
+        action, following = (np.stack(rows[name].to_list()) for name in ("action", "next_observation"))
+        solved = bool(rows["success"].any())
+        episodes.append(measure_episode(action, following, rows["task_reward"].to_numpy(), solved, "raw"))
+    return {metric: float(np.mean([episode[metric] for episode in episodes])) for metric in episodes[0]}
 
 
 def as_transitions(frame: pd.DataFrame, observation: str) -> Transitions:

@@ -6,7 +6,7 @@ _AGENT = ("policy.safetensors", "policy.json", "curve.csv", "evaluation.csv", "g
 OUTPUTS: dict[str, tuple[str, ...]] = {
     "train_expert": _AGENT,
     "train_sac": _AGENT,
-    "collect_demonstrations": ("demonstrations.parquet", *_RUN),
+    "collect_demonstrations": ("demonstrations.parquet", "gate.json", *_RUN),
     "learn_reward": (
         "reward.safetensors",
         "reward.json",

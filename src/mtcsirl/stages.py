@@ -79,12 +79,18 @@ def transfer_job(
 def collect_demonstrations(
     settings: DemonstrationRunSettings, expert: Path, task: str, target: int, cs_reward: str, output: Path
 ) -> None:
-    """Record episodes of the stochastic expert in the folder ``expert`` as ``demonstrations.parquet``."""
+    """Record episodes of the stochastic expert in the folder ``expert`` as ``demonstrations.parquet``.
+
+    They pass the expert's gate themselves or are marked: ten other episodes of the same expert may have been lucky.
+    """
     from mtcsirl.demonstrations import collect_demonstrations as collect
+    from mtcsirl.demonstrations import demonstrated
+    from mtcsirl.evaluation import gate_verdict
 
     with _run(settings, output, {"policy": expert / "policy.safetensors"}):
         frame = collect(load_policy(expert), task, target, settings, seed=0)
         storage.write_parquet(output / "demonstrations.parquet", frame)
+        storage.write_json(output / "gate.json", gate_verdict("expert", demonstrated(frame), cs_reward, settings.gates))
 
 
 def learn_reward(

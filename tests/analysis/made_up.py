@@ -11,7 +11,7 @@ import pandas as pd
 
 from mtcsirl import storage
 from mtcsirl.analysis.rows import KEY, OK, POLICIES, ROW_COLUMNS, agents, metrics
-from mtcsirl.study import Study
+from mtcsirl.study import Demonstrations, Study
 
 Means = Callable[[dict[str, Any]], dict[str, float]]
 """Means of the metrics of an agent, from its key."""
@@ -44,7 +44,20 @@ def _frame(study: Study) -> tuple[list[dict[str, Any]], pd.DataFrame]:
                 for metric in metrics(study):
                     jitter = noise(key, metric, policy)
                     rows.append(own | {"policy": policy, "metric": metric, "noise": jitter})
+    for run in study.demonstrations:
+        key = {"stage": run.stage, "experiment": "", "method": "", "cs_reward": run.cs_reward, "source": ""}
+        keys.append(key | {"task": run.task, "target": run.target, "seed": run.expert.seed})
+        own = keys[-1] | {"agent": len(keys) - 1, "episodes": 0, "status": OK, "folder": f"results/{run.folder}"}
+        rows += [
+            own | {"policy": "stochastic", "metric": metric, "noise": 0.0} for metric in ("success", run.cs_reward)
+        ]
     return keys, pd.DataFrame(rows)
+
+
+def write_demonstrations(run: Demonstrations, results: Path, *, passed: bool = True) -> None:
+    """The gate of one expert's demonstrations."""
+    gate = {"gate": "expert", "passed": passed, "success": 1.0 if passed else 0.6, "metric": 0.75}
+    storage.write_json(results / run.folder / "gate.json", gate)
 
 
 def write_run(run: Any, results: Path, means: Means, *, episodes: int = 2, passed: bool = True) -> None:

@@ -38,7 +38,7 @@ def as_the_paper_says(agent):
     if agent["stage"] == "train_sac":
         return SAC
     cs, experiment, method = agent["cs_reward"], agent["experiment"], agent["method"]
-    if agent["stage"] == "train_expert":
+    if agent["stage"] in ("train_expert", "collect_demonstrations"):
         return at(cs, 0.99)
     if agent["stage"] == "learn_reward":
         return at(cs, 0.9, 0.5 if experiment == "ablation_curriculum" else 1.0)

@@ -159,6 +159,22 @@ def test_failed_experts_are_a_failed_precondition():
     assert set(found.values()) == {"precondition not met"}
 
 
+def test_demonstrations_fail_the_precondition_where_their_expert_was_lucky():
+    found = verdicts(change=lambda rows: fail_gates(rows, stage="collect_demonstrations"))
+    assert found.pop("C1") == "reproduced", "C1 is about the experts' own episodes"
+    assert set(found.values()) == {"precondition not met"}
+
+
+def test_an_expert_and_its_own_demonstrations_count_once():
+    def one_of_each(rows):
+        rows = fail_gates(rows, stage="collect_demonstrations", task="reach")
+        return fail_gates(rows, stage="train_expert", task="reach", seed=0)
+
+    assert verdict("C7", change=one_of_each) == "reproduced", "five of six pass"
+    blocked = verdict("C7", change=lambda rows: fail_gates(one_of_each(rows), stage="train_expert", task="door-close"))
+    assert blocked == "precondition not met"
+
+
 def test_a_broken_irl_confirms_no_claim_that_something_fails():
     found = verdicts(change=lambda rows: fail_gates(rows, stage="learn_reward"))
     assert {name for name, verdict in found.items() if verdict == "precondition not met"} == {"C3", "C4", "C6"}

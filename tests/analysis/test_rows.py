@@ -19,7 +19,7 @@ from mtcsirl.analysis.rows import (
 from mtcsirl.design import design, variants
 from mtcsirl.errors import UserError
 from mtcsirl.settings import Settings
-from tests.analysis.made_up import write_run
+from tests.analysis.made_up import write_demonstrations, write_run
 
 SETTINGS = Settings(
     seeds=(0, 1, 2),
@@ -43,6 +43,8 @@ def results(tmp_path):
     for run in STUDY:
         if run.stage in SPEEDS:
             write_run(run, tmp_path, means)
+    for run in STUDY.demonstrations:
+        write_demonstrations(run, tmp_path)
     return tmp_path
 
 
@@ -53,7 +55,7 @@ def velocity(rows, **key):
 def test_every_agent_of_the_study_with_its_mean_over_episodes(results):
     rows = evaluation_rows(STUDY, results)
     assert set(rows["status"]) == {"ok"}
-    agents = rows.drop_duplicates(list(rows_module.KEY))
+    agents = rows[rows["stage"] != "collect_demonstrations"].drop_duplicates(list(rows_module.KEY))
     members = sum(len(run.members) for run in STUDY.irl_runs)
     assert len(agents) == len(STUDY.experts) + len(STUDY.baselines) + members + len(STUDY.transfers)
     for stage, speed in SPEEDS.items():
@@ -116,6 +118,22 @@ def test_agent_below_its_gate_counts_and_is_marked(results):
     rows = velocity(evaluation_rows(STUDY, results), stage="train_expert", task=STUDY.experts[0].task)
     assert (rows["status"] == "below gate").sum() == 1
     assert rows["value"].notna().all()
+
+
+def test_demonstrations_stand_beside_their_expert_with_their_own_gate(results):
+    rows = select(evaluation_rows(STUDY, results), stage="collect_demonstrations")
+    assert len(rows) == 2 * len(STUDY.demonstrations)
+    assert set(rows["status"]) == {"ok"}
+    assert set(rows["seed"]) == {SETTINGS.seeds[0]}
+    write_demonstrations(STUDY.demonstrations[0], results, passed=False)
+    rows = select(evaluation_rows(STUDY, results), stage="collect_demonstrations", task=STUDY.demonstrations[0].task)
+    assert set(rows["status"]) == {"below gate"}
+    assert select(rows, metric="success")["value"].tolist() == [0.6]
+    (results / STUDY.demonstrations[0].folder / "gate.json").unlink()
+    with pytest.raises(UserError, match="is missing"):
+        evaluation_rows(STUDY, results)
+    rows = select(evaluation_rows(STUDY, results, partial=True), stage="collect_demonstrations")
+    assert (rows["status"] == "missing").sum() == 2
 
 
 def test_copied_seed_is_flagged_and_not_averaged(results):

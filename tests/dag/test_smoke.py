@@ -108,8 +108,11 @@ def test_the_baseline_has_no_cs_reward(results: Path, study: Study) -> None:
 
 
 def test_gates_say_what_was_asked_and_what_was_reached(results: Path, study: Study) -> None:
-    gates = {"train_expert": "expert", "train_sac": "sac", "learn_reward": "generator", "transfer": "sac"}
-    for run in agents(study):
+    gates = {
+        "train_expert": "expert", "train_sac": "sac", "collect_demonstrations": "expert",
+        "learn_reward": "generator", "transfer": "sac",
+    }  # fmt: skip
+    for run in [*agents(study), *study.demonstrations]:
         gate = storage.read_json(results / run.folder / "gate.json")
         assert gate["gate"] == gates[run.stage]
         assert isinstance(gate["passed"], bool)

@@ -106,6 +106,7 @@ def rows_of(artefact):
     study = design(SETTINGS, artefact)
     agents = (*study.experts, *study.baselines, *study.irl_runs, *study.transfers)
     rows = [path for run in agents for path in files(run, "evaluation.csv", "curve.csv", "gate.json")]
+    rows += [path for run in study.demonstrations for path in files(run, "gate.json")]
     return rows + [path for run in study.scores for path in files(run, "scores.csv", "points.parquet")]
 
 

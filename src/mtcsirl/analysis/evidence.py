@@ -116,10 +116,13 @@ class Evidence:
         return self.group(run.cs_reward, tasks or run.tasks, {"stage": "learn_reward", **run.key}, run.targets[0])
 
     def blocked(self, run: "Run", needs: Iterable[str], share: float) -> str:
-        """Which of ``needs`` ("experts", "generators") of ``run`` failed their gate too often; "" if none did."""
+        """Which of ``needs`` ("experts", "generators") of ``run`` failed their gate too often; "" if none did.
+
+        An expert passes if it and its demonstrations do.
+        """
         keys: dict[str, dict[str, Any]] = {
             "experts": {
-                "stage": "train_expert",
+                "stage": ["train_expert", "collect_demonstrations"],
                 "cs_reward": run.cs_reward,
                 "task": list(run.tasks),
                 "target": list(run.targets),
@@ -130,9 +133,9 @@ class Evidence:
         for name in needs:
             judged = select(self._agents, **keys[name])
             judged = judged[judged["status"] != MISSING]
-            passed = int((judged["status"] == OK).sum())
-            if passed < share * len(judged):
-                return f"{passed} of {len(judged)} {name} passed their gate"
+            passed = (judged["status"] == OK).groupby([judged["task"], judged["target"], judged["seed"]]).all()
+            if passed.sum() < share * len(passed):
+                return f"{passed.sum()} of {len(passed)} {name} passed their gate"
         return ""
 
 

@@ -14,7 +14,7 @@ import pandas as pd
 from mtcsirl import storage
 from mtcsirl.errors import UserError
 from mtcsirl.settings.study import CS_REWARDS
-from mtcsirl.study import Baseline, Expert, IrlRun, Run, Study, Transfer
+from mtcsirl.study import Baseline, Demonstrations, Expert, IrlRun, Run, Study, Transfer
 
 KEY = ("stage", "experiment", "method", "cs_reward", "source", "task", "target", "seed")
 ROW_COLUMNS = (*KEY, "policy", "metric", "value", "episodes", "status", "folder")
@@ -35,6 +35,9 @@ POLICIES = ("stochastic", "deterministic")
 def evaluation_rows(study: Study, results: Path | str, *, partial: bool = False) -> pd.DataFrame:
     """Every agent of ``study`` with its evaluation, ``ROW_COLUMNS``; agents are run x member for IRL runs.
 
+    Demonstrations are rows too, of the stage ``collect_demonstrations`` with the seed of their expert: what their
+    episodes reached and whether that passes the expert's gate.
+
     Raises:
         UserError: a run is missing and ``partial`` is false; a file is unreadable.
     """
@@ -45,6 +48,7 @@ def evaluation_rows(study: Study, results: Path | str, *, partial: bool = False)
             if not (folder / "evaluation.csv").is_file():
                 _demand(folder / "evaluation.csv", partial)
             frames.append(_agent_rows(agent, folder, metrics(study)))
+    frames += [_demonstration_rows(run, Path(results) / run.folder, partial) for run in study.demonstrations]
     rows = pd.concat(frames, ignore_index=True) if frames else pd.DataFrame({name: [] for name in ROW_COLUMNS})
     return _mark_equal_seeds(rows[list(ROW_COLUMNS)])
 
@@ -158,6 +162,21 @@ def _agent_rows(agent: dict[str, Any], folder: Path, names: tuple[str, ...]) -> 
         if status in (OK, BELOW_GATE):
             rows["value"] = groups.mean().reindex(grid)
     return rows.reset_index().assign(**agent, status=status, folder=str(folder))
+
+
+def _demonstration_rows(run: Demonstrations, folder: Path, partial: bool) -> pd.DataFrame:
+    """Success and metric of one expert's demonstrations."""
+    verdict: dict[str, Any] = {"success": np.nan, "metric": np.nan}
+    status = MISSING
+    if _present(folder / "gate.json", partial):
+        verdict = storage.read_json(folder / "gate.json")
+        status = OK if verdict["passed"] else BELOW_GATE
+    key: dict[str, Any] = {"stage": run.stage, "experiment": "", "method": "", "cs_reward": run.cs_reward, "source": ""}
+    key |= {"task": run.task, "target": run.target, "seed": run.expert.seed}
+    rows = pd.DataFrame(
+        {"policy": "stochastic", "metric": ["success", run.cs_reward], "value": [verdict["success"], verdict["metric"]]}
+    )
+    return rows.assign(**key, episodes=0, status=status, folder=str(folder))
 
 
 def _status(agent: dict[str, Any], own: pd.DataFrame, folder: Path) -> str:

@@ -90,7 +90,7 @@ def _collect_demonstrations(verbs: Verbs) -> None:
         run,
         does="record episodes of an expert's stochastic policy with the task reward",
         needs="the folder of a trained expert",
-        writes="demonstrations.parquet, settings.json, provenance.json into --output",
+        writes="demonstrations.parquet, gate.json, settings.json, provenance.json into --output",
     )
     verb.add_argument("--expert", required=True, type=_folder, metavar="DIR", help="folder of the expert")
     add_task(verb)

@@ -181,7 +181,13 @@ def _members(run: Run, gate: dict[str, Any]) -> Iterator[tuple[str, dict[str, An
         yield run.task, gate  # type: ignore[union-attr]
 
 
-AGENT_NAMES = {"train_expert": "expert", "train_sac": "SAC", "learn_reward": "generator", "transfer": "transfer agent"}
+AGENT_NAMES = {
+    "train_expert": "expert",
+    "train_sac": "SAC",
+    "collect_demonstrations": "demonstrations",
+    "learn_reward": "generator",
+    "transfer": "transfer agent",
+}
 
 
 def _agent_name(run: Run) -> str:

@@ -52,6 +52,7 @@ class DemonstrationRunSettings(Frozen):
     environment: EnvironmentSettings = Field(default_factory=EnvironmentSettings)
     episodes: int = Field(default=20, gt=0)
     episode_steps: int = Field(default=500, gt=0, le=500)
+    gates: GateSettings = Field(default_factory=GateSettings)
 
 
 class IrlRunSettings(Frozen):
@@ -135,7 +136,10 @@ def demonstration_run(settings: Settings, experiments: tuple[str, ...] = ("multi
     """The settings of one expert's demonstrations: as many episodes as the hungriest of ``experiments`` reads."""
     episodes = max(settings.demonstrations.episodes[name] for name in experiments)  # type: ignore[index]
     return DemonstrationRunSettings(
-        environment=settings.environment, episodes=episodes, episode_steps=settings.evaluation.episode_steps
+        environment=settings.environment,
+        episodes=episodes,
+        episode_steps=settings.evaluation.episode_steps,
+        gates=settings.gates,
     )
 
 

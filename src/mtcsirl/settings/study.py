@@ -61,6 +61,7 @@ EXPERT_STEPS = {
     "default": 40_000,
     "button-press-topdown-wall": 100_000,
     "coffee-button": 100_000,
+    "door-close": 60_000,
     "faucet-open": 80_000,
     "plate-slide": 80_000,
     "push-back": 100_000,
