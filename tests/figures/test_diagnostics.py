@@ -45,6 +45,17 @@ def test_every_panel_has_every_generator(discriminators: tuple[str, ...]) -> Non
     assert labels == ["reach, target 1", "drawer-close, target 2"]
 
 
+def test_a_bottleneck_has_a_row_of_its_own() -> None:
+    curve, diagnostics = _frames(("f",))
+    losses = diagnostics[diagnostics["metric"] == "cross_entropy"]
+    rows = pd.concat([diagnostics, losses.assign(metric="kl"), losses.assign(metric="beta", value=0.1)])
+    figure = draw(curve, rows, "velocity", "MT-VAIRL", "desk")
+    titles = [axes.get_title(loc="left") for axes in figure.axes]
+    assert len(titles) == 16
+    assert titles[12:14] == ["(m) f: bottleneck", "(n) f: multiplier"]
+    assert {tuple(line.get_ydata()) for line in figure.axes[13].lines} == {(0.1,) * 20}
+
+
 def test_values_of_the_curve_and_of_the_diagnostics_are_not_mixed() -> None:
     """Both files hold the temperature; were both drawn, each line would have two points per step."""
     figure = draw(*_frames(("f",)), "velocity", "MT-CSIRL", "desk")

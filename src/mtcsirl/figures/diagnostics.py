@@ -1,6 +1,8 @@
 """What one IRL run logged, iteration by iteration: generators in the first two rows, each discriminator in one more."""
 
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
 import pandas as pd
 from matplotlib.axes import Axes
@@ -23,28 +25,46 @@ DIAGNOSTIC_COLUMNS = ("task", "target", "step", "discriminator", "metric", "valu
 """What is read of curve.csv and diagnostics.csv."""
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#222222", "#8C6D31")
 """One per task and target in their order, Okabe-Ito; the ninth begins anew."""
-EXPERT, GENERATOR = (0, (3, 1)), "-"
-WIDTH, PANEL_HEIGHT = 7.5, 1.45
+LineStyle = str | tuple[int, tuple[int, ...]]
+EXPERT: LineStyle = (0, (3, 1))
+GENERATOR: LineStyle = "-"
+COLUMNS = 4
+WIDTH, PANEL_HEIGHT, LINE_HEIGHT = 7.5, 1.45, 0.15
+"""Inches; the last of one line of the legend."""
 WINDOW = 5
 """Iterations of the centred running mean: single rollouts and minibatches hide the trend."""
 
-Panel = tuple[str, tuple[tuple[str, str | tuple[int, tuple[int, ...]]], ...], str]
-"""Title, metrics with their line style, label of the value axis."""
-GENERATOR_PANELS: tuple[Panel, ...] = (
-    ("success", (("success", "-"),), "share of episodes"),
-    ("task reward", (("task_reward", "-"),), "per step"),
-    ("curriculum", (("curriculum", "-"),), r"$\alpha$"),
-    ("log π", (("log_pi_expert_q50", EXPERT), ("log_pi_generator_q50", GENERATOR)), "nats"),
-    ("temperature", (("temperature", "-"),), "reward units"),
-    ("critics", (("critic_gradient_norm", "-"),), "gradient norm"),
-    ("actor", (("actor_gradient_norm", "-"),), "gradient norm"),
+
+class Panel(NamedTuple):
+    """One panel: its title, its metrics with their line styles, and the label of its value axis."""
+
+    title: str
+    lines: Mapping[str, LineStyle]
+    label: str
+
+
+GENERATOR_PANELS = (
+    Panel("success", {"success": "-"}, "share of episodes"),
+    Panel("task reward", {"task_reward": "-"}, "per step"),
+    Panel("curriculum", {"curriculum": "-"}, r"$\alpha$"),
+    Panel("log π", {"log_pi_expert_q50": EXPERT, "log_pi_generator_q50": GENERATOR}, "nats"),
+    Panel("temperature", {"temperature": "-"}, "reward units"),
+    Panel("critics", {"critic_gradient_norm": "-"}, "gradient norm"),
+    Panel("actor", {"actor_gradient_norm": "-"}, "gradient norm"),
 )
-DISCRIMINATOR_PANELS: tuple[Panel, ...] = (
-    ("accuracy", (("accuracy_expert", EXPERT), ("accuracy_generator", GENERATOR)), "share right"),
-    ("loss", (("cross_entropy", "-"),), "cross-entropy (nats)"),
-    ("reward", (("f_expert_mean", EXPERT), ("f_generator_mean", GENERATOR)), "mean"),
-    ("step", (("gradient_norm", "-"),), "gradient norm"),
+DISCRIMINATOR_PANELS = (
+    Panel("accuracy", {"accuracy_expert": EXPERT, "accuracy_generator": GENERATOR}, "share right"),
+    Panel("loss", {"cross_entropy": "-"}, "cross-entropy (nats)"),
+    Panel("reward", {"f_expert_mean": EXPERT, "f_generator_mean": GENERATOR}, "mean"),
+    Panel("step", {"gradient_norm": "-"}, "gradient norm"),
 )
+BOTTLENECK_PANELS = (
+    Panel("bottleneck", {"kl": "-"}, "KL (nats)"),
+    Panel("multiplier", {"beta": "-"}, r"$\beta$"),
+    Panel("logit", {"logit_expert": EXPERT, "logit_generator": GENERATOR}, "mean"),
+    Panel("truth", {"pearson_generator": "-"}, "Pearson's r"),
+)
+"""One more row for MT-VAIRL(-GP)."""
 ENDS = ("q05", "q95")
 CHANCE = {"accuracy": 0.5, "loss": 1.3863}
 """Where a discriminator that tells nothing apart is: half right, 2 log 2."""
@@ -58,25 +78,26 @@ def draw(curve: pd.DataFrame, diagnostics: pd.DataFrame, cs_reward: str, title: 
     """
     members = list(dict.fromkeys(zip(curve["task"], curve["target"], strict=True)))
     names = list(diagnostics["discriminator"].dropna().unique())
-    rows = 2 + len(names)
-    figure = new_figure(WIDTH, 0.7 + PANEL_HEIGHT * rows)
-    figure.suptitle(title)
-    grid = figure.subplots(rows, 4, sharex=True)
-    behaviour: Panel = ("behaviour", ((cs_reward, "-"),), quantity_label(cs_reward))
+    behaviour = Panel("behaviour", {cs_reward: "-"}, quantity_label(cs_reward))
+    of_discriminator = DISCRIMINATOR_PANELS + (BOTTLENECK_PANELS if (diagnostics["metric"] == "kl").any() else ())
     panels = [(panel, "") for panel in (behaviour, *GENERATOR_PANELS)]
-    panels += [(panel, name) for name in names for panel in DISCRIMINATOR_PANELS]
+    panels += [(panel, name) for name in names for panel in of_discriminator]
+    rows, legend_columns = len(panels) // COLUMNS, 3
+    figure = new_figure(WIDTH, 0.4 + PANEL_HEIGHT * rows + LINE_HEIGHT * math.ceil(len(members) / legend_columns))
+    figure.suptitle(title)
+    grid = figure.subplots(rows, COLUMNS, sharex=True)
     both = pd.concat([curve.assign(discriminator=None), _only_in(diagnostics, curve)], ignore_index=True)
     for index, (axes, (panel, name)) in enumerate(zip(grid.flat, panels, strict=True)):
         own = both[both["discriminator"].fillna("") == name]
         _draw_panel(axes, panel, own, members)
-        panel_title(axes, index, f"{name}: {panel[0]}" if name else panel[0])
+        panel_title(axes, index, f"{name}: {panel.title}" if name else panel.title)
         if panel is behaviour:
             axes.axhline(target_of(cs_reward), color=TARGET_COLOUR, linewidth=0.8)
     for axes in grid[-1]:
         axes.set_xlabel("environment steps")
         axes.xaxis.set_major_formatter(lambda step, _: f"{step / 1000:g}k" if step else "0")
     handles, labels = grid[0, 0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=min(3, len(labels)))
+    figure.legend(handles, labels, loc="outside lower center", ncols=min(legend_columns, len(labels)))
     add_notes(figure, scale_notes(scale))
     return figure
 
@@ -87,25 +108,24 @@ def _only_in(diagnostics: pd.DataFrame, curve: pd.DataFrame) -> pd.DataFrame:
 
 
 def _draw_panel(axes: Axes, panel: Panel, rows: pd.DataFrame, members: Sequence[tuple[str, int]]) -> None:
-    title, metrics, label = panel
-    axes.set_ylabel(label)
-    if rows.loc[rows["metric"].isin([name for name, _ in metrics]), "value"].notna().sum() == 0:
+    axes.set_ylabel(panel.label)
+    if rows.loc[rows["metric"].isin(list(panel.lines)), "value"].notna().sum() == 0:
         empty_panel(axes, "not logged by this method")
         return
     for number, (task, target) in enumerate(members):
         of_member = rows[(rows["task"] == task) & (rows["target"] == target)]
-        for metric, style in metrics:
+        for metric, style in panel.lines.items():
             own = of_member[of_member["metric"] == metric].sort_values("step")
             smooth = own["value"].rolling(WINDOW, center=True, min_periods=1).mean()
-            name = f"{task}, target {target}" if style == metrics[-1][1] else None
+            name = f"{task}, target {target}" if style == GENERATOR else None
             axes.plot(
                 own["step"], smooth, color=COLOURS[number % len(COLOURS)], linestyle=style, label=name, linewidth=1
             )
-        if title == "log π":
+        if panel.title == "log π":
             _draw_range(axes, of_member, COLOURS[number % len(COLOURS)])
-    if title in CHANCE:
-        axes.axhline(CHANCE[title], color="0.5", linewidth=0.8, linestyle=":")
-    if title in ("accuracy", "success"):
+    if panel.title in CHANCE:
+        axes.axhline(CHANCE[panel.title], color="0.5", linewidth=0.8, linestyle=":")
+    if panel.title in ("accuracy", "success"):
         axes.set_ylim(-0.03, 1.03)
 
 
