@@ -214,3 +214,9 @@ def test_settings_and_study_import_neither_torch_nor_snakemake(module: str) -> N
         "sys.exit(bool({'torch', 'snakemake', 'pandas', 'mujoco'} & set(sys.modules)))"
     )
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+@pytest.mark.parametrize("section", ["expert", "baseline", "transfer"])
+def test_no_task_slips_through_the_smoke_scales_budget(section: str) -> None:
+    """An overlay merges mappings: a task that gets a budget of its own at desk scale has to be named there too."""
+    assert set(getattr(load(scale="smoke"), section).steps.values()) == {400}

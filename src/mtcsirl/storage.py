@@ -93,7 +93,8 @@ def read_csv(path: Path | str, columns: tuple[str, ...] = ()) -> "pd.DataFrame":
     """Read a tidy frame and check that ``columns`` are there; empty cells of text columns stay empty strings."""
     import pandas as pd
 
-    text = dict.fromkeys(("task", "cs_reward", "method", "source", "experiment", "policy", "metric"), str)
+    names = ("task", "cs_reward", "method", "source", "experiment", "policy", "metric", "discriminator")
+    text = dict.fromkeys(names, str)
 
     def parse(p: Path) -> "pd.DataFrame":
         return pd.read_csv(p, dtype=text, keep_default_na=True).fillna(dict.fromkeys(text, ""))
@@ -114,8 +115,8 @@ def read_parquet(path: Path | str, columns: tuple[str, ...] = ()) -> "pd.DataFra
     from pyarrow.parquet import read_schema
 
     def parse(p: Path) -> "pd.DataFrame":
-        present = [name for name in read_schema(p).names if name in columns]
-        return pd.read_parquet(p, columns=present if columns else None)
+        present = [name for name in read_schema(p).names if name in columns] if columns else None
+        return pd.read_parquet(p, columns=present)
 
     return _with_columns(path, _read(path, parse, "Parquet file"), columns)
 

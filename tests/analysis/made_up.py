@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 from mtcsirl import storage
-from mtcsirl.analysis.rows import KEY, OK, POLICIES, ROW_COLUMNS, agents, metrics
+from mtcsirl.analysis.rows import KEY, OK, POLICIES, ROW_COLUMNS, agents, metrics, run_key
 from mtcsirl.study import Demonstrations, Study
 
 Means = Callable[[dict[str, Any]], dict[str, float]]
@@ -45,8 +45,7 @@ def _frame(study: Study) -> tuple[list[dict[str, Any]], pd.DataFrame]:
                     jitter = noise(key, metric, policy)
                     rows.append(own | {"policy": policy, "metric": metric, "noise": jitter})
     for run in study.demonstrations:
-        key = {"stage": run.stage, "experiment": "", "method": "", "cs_reward": run.cs_reward, "source": ""}
-        keys.append(key | {"task": run.task, "target": run.target, "seed": run.expert.seed})
+        keys.append(run_key(run) | {"task": run.task, "target": run.target, "seed": run.expert.seed})
         own = keys[-1] | {"agent": len(keys) - 1, "episodes": 0, "status": OK, "folder": f"results/{run.folder}"}
         rows += [
             own | {"policy": "stochastic", "metric": metric, "noise": 0.0} for metric in ("success", run.cs_reward)

@@ -15,6 +15,7 @@ from mtcsirl.irl.methods.base import Setup
 from mtcsirl.irl.rollout import collect
 from mtcsirl.irl.run import CHECKPOINT, learn_reward, make_trainer
 from mtcsirl.irl.trainer import IrlTrainer
+from mtcsirl.outputs import CURVE_COLUMNS, DIAGNOSTIC_COLUMNS
 from mtcsirl.rewards.learned import load_learned_reward
 from mtcsirl.storage import checksum
 from mtcsirl.transitions import Transitions
@@ -51,7 +52,9 @@ def test_every_method_trains_and_leaves_a_whole_run(method, demonstrations, tmp_
     assert samples.groupby("task").size().tolist() == [180, 180]
     for task, target in MEMBERS:
         assert (tmp_path / "policies" / f"{task}-t{target}.safetensors").is_file()
+    assert tuple(curve.columns) == CURVE_COLUMNS
     diagnostics = pd.read_csv(tmp_path / "diagnostics.csv", keep_default_na=False)
+    assert tuple(diagnostics.columns) == DIAGNOSTIC_COLUMNS
     assert set(diagnostics["discriminator"]) == {"", "f"} | ({"task"} if method == "mt_csirl_lt" else set())
     assert not (tmp_path / CHECKPOINT).exists()
 

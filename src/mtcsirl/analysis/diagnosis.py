@@ -17,11 +17,11 @@ from typing import Any
 import pandas as pd
 
 from mtcsirl import storage
+from mtcsirl.outputs import DIAGNOSTIC_COLUMNS
 from mtcsirl.study import IrlRun
 
 SATURATED, BLIND = 0.99, 0.55
 LAST_SHARE = 0.25
-DIAGNOSTIC_COLUMNS = ("task", "target", "step", "discriminator", "metric", "value")
 RUN = ("experiment", "method", "cs_reward", "source", "seed")
 OF_GENERATOR = ("log_pi_expert_q05", "log_pi_expert_q95", "log_pi_generator_q05", "log_pi_generator_q95", "temperature")
 OF_DISCRIMINATOR = ("accuracy_expert", "accuracy_generator", "gradient_norm", "f_expert_mean", "f_generator_mean")
@@ -52,7 +52,7 @@ def diagnose(diagnostics: pd.DataFrame, gates: Sequence[Mapping[str, Any]]) -> p
     """
     late = diagnostics[diagnostics["step"] > (1 - LAST_SHARE) * diagnostics["step"].max()]
     key = ["task", "target", "discriminator"]
-    means = late.fillna({"discriminator": ""}).groupby([*key, "metric"])["value"].mean().unstack("metric")
+    means = late.groupby([*key, "metric"])["value"].mean().unstack("metric")
     rows = []
     for gate in gates:
         member = means.loc[(gate["task"], gate["target"])]

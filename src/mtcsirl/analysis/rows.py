@@ -126,19 +126,24 @@ def matrix(rows: pd.DataFrame) -> pd.DataFrame:
 
 def agents(run: Run) -> Iterator[dict[str, Any]]:
     """The ``KEY`` of each agent that ``run`` evaluates."""
+    key = run_key(run)
+    if isinstance(run, IrlRun):
+        for task, target in run.members:
+            yield key | {"task": task, "target": target, "seed": run.seed}
+    elif isinstance(run, Expert | Baseline | Transfer):
+        yield key | {"task": run.task, "target": run.target, "seed": run.seed}
+
+
+def run_key(run: Run) -> dict[str, Any]:
+    """The part of ``KEY`` that all agents of ``run`` share."""
     irl = run.irl if isinstance(run, Transfer) else run if isinstance(run, IrlRun) else None
-    key: dict[str, Any] = {
+    return {
         "stage": run.stage,
         "experiment": irl.experiment if irl else "",
         "method": irl.method if irl else "",
         "cs_reward": irl.cs_reward if irl else getattr(run, "cs_reward", ""),
         "source": irl.source if irl else "",
     }
-    if isinstance(run, IrlRun):
-        for task, target in run.members:
-            yield key | {"task": task, "target": target, "seed": run.seed}
-    elif isinstance(run, Expert | Baseline | Transfer):
-        yield key | {"task": run.task, "target": run.target, "seed": run.seed}
 
 
 def metrics(study: Study) -> tuple[str, ...]:
@@ -171,8 +176,7 @@ def _demonstration_rows(run: Demonstrations, folder: Path, partial: bool) -> pd.
     if _present(folder / "gate.json", partial):
         verdict = storage.read_json(folder / "gate.json")
         status = OK if verdict["passed"] else BELOW_GATE
-    key: dict[str, Any] = {"stage": run.stage, "experiment": "", "method": "", "cs_reward": run.cs_reward, "source": ""}
-    key |= {"task": run.task, "target": run.target, "seed": run.expert.seed}
+    key = run_key(run) | {"task": run.task, "target": run.target, "seed": run.expert.seed}
     rows = pd.DataFrame(
         {"policy": "stochastic", "metric": ["success", run.cs_reward], "value": [verdict["success"], verdict["metric"]]}
     )

@@ -2,17 +2,21 @@
 
 import argparse
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 from mtcsirl.ablations import ABLATIONS
 from mtcsirl.commands.arguments import Verbs, add_study_settings, add_verb, study_settings
 from mtcsirl.commands.drawing import write_figure
 from mtcsirl.design import ARTEFACTS, design
 from mtcsirl.settings import Settings
+from mtcsirl.study import Run
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from mtcsirl.analysis.claims import Finding
 
+AnyRun = TypeVar("AnyRun", bound=Run)
 HEAT_MAPS = {"table_1": "action_norm", "table_3": "velocity"}
 """Tables that are also drawn, beside the paper's, and their cs-reward."""
 
@@ -39,6 +43,13 @@ def register(verbs: Verbs) -> None:
         _reward_quality,
         does="hold every learned reward that was scored against the truth, over seeds",
         writes="reward_quality.csv, .md",
+    )
+    _add(
+        verbs,
+        "diagnostics",
+        _diagnostics,
+        does="say which discriminators of a study were saturated, asleep or at work",
+        writes="diagnostics.csv, .md",
     )
     _add(verbs, "claims", _claims, does="judge the paper's claims", writes="claims.json, .md, .pdf, .png")
     _add(verbs, "results", _results, does="write verdicts and tables as one Markdown page", writes="results.md")
@@ -106,17 +117,36 @@ def _figure(parsed: argparse.Namespace) -> None:
 def _reward_quality(parsed: argparse.Namespace) -> None:
     from mtcsirl.analysis.reward_quality import quality_markdown, read_quality
     from mtcsirl.figures.style import scale_notes
-    from mtcsirl.storage import write_csv, write_text
 
     settings = study_settings(parsed)
-    runs = design(settings).scores
-    if parsed.partial:
-        runs = tuple(run for run in runs if (Path(settings.results) / run.folder / "points.parquet").is_file())
+    runs = _there(design(settings).scores, settings, "points.parquet", parsed.partial)
     rows = read_quality(runs, settings.results, settings.score.bootstrap)
-    folder = parsed.output or Path(settings.results) / "scores"
     text = quality_markdown(rows, " ".join(scale_notes(settings.scale)))
-    write_csv(folder / "reward_quality.csv", rows)
-    write_text(folder / "reward_quality.md", text)
+    _write_summary((parsed.output or Path(settings.results) / "scores") / "reward_quality", rows, text)
+
+
+def _diagnostics(parsed: argparse.Namespace) -> None:
+    from mtcsirl.analysis.diagnosis import diagnoses_markdown, read_diagnoses
+    from mtcsirl.figures.style import scale_notes
+
+    settings = study_settings(parsed)
+    runs = _there(design(settings).irl_runs, settings, "gate.json", parsed.partial)
+    rows = read_diagnoses(runs, settings.results)
+    text = diagnoses_markdown(rows, scale_notes(settings.scale))
+    _write_summary((parsed.output or Path(settings.results) / "diagnostics") / "diagnostics", rows, text)
+
+
+def _there(runs: tuple[AnyRun, ...], settings: Settings, name: str, partial: bool) -> tuple[AnyRun, ...]:
+    """All ``runs``; if ``partial``, those that have left their file ``name``."""
+    return tuple(run for run in runs if not partial or (Path(settings.results) / run.folder / name).is_file())
+
+
+def _write_summary(path: Path, rows: "pd.DataFrame", text: str) -> None:
+    """Write rows as ``path``.csv and ``text`` as ``path``.md, and print it."""
+    from mtcsirl.storage import write_csv, write_text
+
+    write_csv(path.with_suffix(".csv"), rows)
+    write_text(path.with_suffix(".md"), text)
     print(text)
 
 

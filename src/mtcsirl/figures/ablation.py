@@ -8,6 +8,7 @@ from matplotlib.figure import Figure
 
 from mtcsirl.ablations import ABLATIONS
 from mtcsirl.figures.style import (
+    COLOURS,
     NO_RUNS,
     TARGET_COLOUR,
     TEXT_WIDTH,
@@ -22,8 +23,8 @@ from mtcsirl.figures.style import (
 )
 from mtcsirl.settings import Settings
 
-LOOKS = (("#0072B2", "o"), ("#D55E00", "D"), ("#009E73", "s"), ("#CC79A7", "^"))
-"""Colour and marker of the variants in their order; Okabe-Ito."""
+LOOKS = tuple(zip(COLOURS, "oDs^", strict=False))
+"""Colour and marker of the variants in their order."""
 STAGES = {"expert": "train_expert", "irl": "learn_reward", "transfer": "transfer"}
 NAMES = {"expert": "experts", "irl": "generators", "transfer": "new agents"}
 

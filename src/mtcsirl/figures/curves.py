@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from mtcsirl.analysis.statistics import summarise, t_interval
-from mtcsirl.figures.style import NO_RUNS, NOT_ASKED, TARGET_COLOUR, Look, empty_panel, quantity_label
+from mtcsirl.figures.style import NO_RUNS, NOT_ASKED, TARGET_COLOUR, Look, empty_panel, quantity_label, step_axis
 
 BINS = 40
 
@@ -93,9 +93,8 @@ def draw_curves(axes: Axes, series: Sequence[Series], metric: str, target: float
         )  # fmt: skip
     axes.set_ylim(0, 1.2 * max(heights, default=1.0))
     axes.set_xlim(left=0)
-    axes.set_xlabel("environment steps")
     axes.set_ylabel(quantity_label(metric))
-    axes.xaxis.set_major_formatter(lambda step, _: f"{step / 1000:g}k" if step else "0")
+    step_axis(axes)
     axes.locator_params(axis="x", nbins=4)
     if all(one.rows.empty for one in series):
         empty_panel(axes, NO_RUNS if any(one.expected for one in series) else NOT_ASKED)

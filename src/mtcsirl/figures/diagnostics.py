@@ -9,6 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from mtcsirl.figures.style import (
+    COLOURS,
     TARGET_COLOUR,
     add_notes,
     empty_panel,
@@ -16,15 +17,11 @@ from mtcsirl.figures.style import (
     panel_title,
     quantity_label,
     scale_notes,
+    step_axis,
     styled,
     target_of,
 )
 
-CURVE_COLUMNS = ("task", "target", "step", "metric", "value")
-DIAGNOSTIC_COLUMNS = ("task", "target", "step", "discriminator", "metric", "value")
-"""What is read of curve.csv and diagnostics.csv."""
-COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#222222", "#8C6D31")
-"""One per task and target in their order, Okabe-Ito; the ninth begins anew."""
 LineStyle = str | tuple[int, tuple[int, ...]]
 EXPERT: LineStyle = (0, (3, 1))
 GENERATOR: LineStyle = "-"
@@ -72,12 +69,12 @@ CHANCE = {"accuracy": 0.5, "loss": 1.3863}
 
 @styled
 def draw(curve: pd.DataFrame, diagnostics: pd.DataFrame, cs_reward: str, title: str, scale: str) -> Figure:
-    """Panels over environment steps per generator; one colour per task and target.
+    """Panels over environment steps per generator; one colour per task and target, the ninth begins anew.
 
     ``curve`` and ``diagnostics`` as an IRL run writes them.
     """
     members = list(dict.fromkeys(zip(curve["task"], curve["target"], strict=True)))
-    names = list(diagnostics["discriminator"].dropna().unique())
+    names = [name for name in diagnostics["discriminator"].unique() if name]
     behaviour = Panel("behaviour", {cs_reward: "-"}, quantity_label(cs_reward))
     of_discriminator = DISCRIMINATOR_PANELS + (BOTTLENECK_PANELS if (diagnostics["metric"] == "kl").any() else ())
     panels = [(panel, "") for panel in (behaviour, *GENERATOR_PANELS)]
@@ -86,16 +83,15 @@ def draw(curve: pd.DataFrame, diagnostics: pd.DataFrame, cs_reward: str, title: 
     figure = new_figure(WIDTH, 0.4 + PANEL_HEIGHT * rows + LINE_HEIGHT * math.ceil(len(members) / legend_columns))
     figure.suptitle(title)
     grid = figure.subplots(rows, COLUMNS, sharex=True)
-    both = pd.concat([curve.assign(discriminator=None), _only_in(diagnostics, curve)], ignore_index=True)
+    both = pd.concat([curve.assign(discriminator=""), _only_in(diagnostics, curve)], ignore_index=True)
     for index, (axes, (panel, name)) in enumerate(zip(grid.flat, panels, strict=True)):
-        own = both[both["discriminator"].fillna("") == name]
+        own = both[both["discriminator"] == name]
         _draw_panel(axes, panel, own, members)
         panel_title(axes, index, f"{name}: {panel.title}" if name else panel.title)
         if panel is behaviour:
             axes.axhline(target_of(cs_reward), color=TARGET_COLOUR, linewidth=0.8)
     for axes in grid[-1]:
-        axes.set_xlabel("environment steps")
-        axes.xaxis.set_major_formatter(lambda step, _: f"{step / 1000:g}k" if step else "0")
+        step_axis(axes)
     handles, labels = grid[0, 0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=min(legend_columns, len(labels)))
     add_notes(figure, scale_notes(scale))

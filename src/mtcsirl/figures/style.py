@@ -35,6 +35,9 @@ class Look(NamedTuple):
     marker: str
 
 
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#222222", "#8C6D31")
+"""For series that are no methods, in their order: Okabe-Ito and two more."""
+
 LOOKS: dict[str, Look] = {
     "expert": Look("Expert", "#009E73", (0, (5, 1.5)), "s"),
     "sac": Look("SAC", "#E69F00", (0, (1, 1.2)), "^"),
@@ -136,6 +139,12 @@ def add_notes(figure: Figure, notes: Sequence[str]) -> None:
 def scale_notes(scale: str) -> list[str]:
     """The line that every smoke artefact carries."""
     return [SMOKE_NOTE] if scale == "smoke" else []
+
+
+def step_axis(axes: Axes) -> None:
+    """Label the horizontal axis as environment steps, in thousands."""
+    axes.set_xlabel("environment steps")
+    axes.xaxis.set_major_formatter(lambda step, _: f"{step / 1000:g}k" if step else "0")
 
 
 def empty_panel(axes: Axes, reason: str) -> None:

@@ -14,8 +14,6 @@ from mtcsirl.transitions import RewardFunction, Transitions
 
 Row = dict[str, Any]
 
-CURVE_COLUMNS = ("task", "target", "step", "metric", "value")
-DIAGNOSTIC_COLUMNS = ("task", "target", "step", "discriminator", "metric", "value")
 QUANTILES = (0.05, 0.5, 0.95)
 
 

@@ -21,11 +21,11 @@ from mtcsirl.demonstrations import load_demonstrations
 from mtcsirl.environments import OBSERVATION_MAPS
 from mtcsirl.errors import UserError
 from mtcsirl.evaluation import COLUMNS, evaluate, gate_verdict, measure_episode, stochastic_means
-from mtcsirl.irl.diagnostics import CURVE_COLUMNS, DIAGNOSTIC_COLUMNS
 from mtcsirl.irl.methods import METHODS
 from mtcsirl.irl.methods.base import Setup
 from mtcsirl.irl.rollout import World
 from mtcsirl.irl.trainer import IrlTrainer
+from mtcsirl.outputs import CURVE_COLUMNS, DIAGNOSTIC_COLUMNS
 from mtcsirl.rewards.ground_truth import COMMON_SENSE_REWARDS
 from mtcsirl.rewards.learned import LearnedReward, save_learned_reward
 from mtcsirl.settings.runs import IrlRunSettings
