@@ -17,8 +17,8 @@ from matplotlib.figure import Figure
 
 from benchmarks import agent_steps, environment_steps, irl_steps, jobs, sac_updates
 from benchmarks.sides import print_rows
-from mtcsirl.provenance import commit, machine
-from mtcsirl.storage import atomic, write_json
+from mtcsirl.files.provenance import commit, machine
+from mtcsirl.files.storage import atomic, write_json
 
 FOLDER = Path(__file__).parent
 

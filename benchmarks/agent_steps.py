@@ -22,10 +22,10 @@ from stable_baselines3 import SAC
 
 from benchmarks.sides import Row, command, row, seconds
 from mtcsirl.agents.jobs import AgentJob
-from mtcsirl.agents.relabelling import ground_truth
 from mtcsirl.agents.training import Training
-from mtcsirl.fast_metaworld.identity import stock_environment
+from mtcsirl.rewards.mixture import ground_truth
 from mtcsirl.settings.runs import AgentRunSettings
+from mtcsirl.worlds.fast.identity import stock_environment
 
 TASKS = ("reach-wall", "push-back")
 EPISODE_STEPS = 500

@@ -1,4 +1,4 @@
-"""Record what rliable computes on fixed data; tests/analysis/test_statistics.py holds our statistics against it.
+"""Record what rliable computes on fixed data; tests/results/test_statistics.py holds our statistics against it.
 
 rliable is archived and pins old packages, so it gets an environment of its own:
 

@@ -20,11 +20,11 @@ import pandas as pd
 import torch
 
 from mtcsirl.errors import UserError
+from mtcsirl.files.storage import read_json, write_csv
 from mtcsirl.settings.loading import load
 from mtcsirl.settings.study import DESIGN_TASKS
-from mtcsirl.storage import read_json, write_csv
-from mtcsirl.study import Baseline, Expert
-from mtcsirl.together import train_together
+from mtcsirl.stages.together import train_together
+from mtcsirl.study.runs import Baseline, Expert
 
 SAC = "sac"
 COLUMNS = ("agent", "task", "target", "seed", "steps", "success", "velocity", "action_norm", "task_reward", "passed")

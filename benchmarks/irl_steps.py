@@ -33,10 +33,11 @@ import torch
 
 from benchmarks.sides import Row, command, row, seconds
 from mtcsirl.agents.jobs import AgentJob
-from mtcsirl.agents.lockstep import Outcome
 from mtcsirl.agents.sac import FusedSac
 from mtcsirl.agents.training import Training
-from mtcsirl.demonstrations import collect_demonstrations
+from mtcsirl.episodes.demonstrations import collect_demonstrations
+from mtcsirl.episodes.lockstep import Outcome
+from mtcsirl.files.storage import write_parquet
 from mtcsirl.irl.methods import METHODS
 from mtcsirl.irl.methods.base import Setup
 from mtcsirl.irl.rollout import World
@@ -44,7 +45,6 @@ from mtcsirl.irl.run import make_trainer
 from mtcsirl.irl.trainer import IrlTrainer
 from mtcsirl.settings import Settings
 from mtcsirl.settings.runs import AgentRunSettings, DemonstrationRunSettings, IrlRunSettings, baseline_run, irl_run
-from mtcsirl.storage import write_parquet
 from mtcsirl.transitions import Transitions
 
 HERE = Path(__file__).parent

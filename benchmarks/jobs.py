@@ -19,9 +19,9 @@ from importlib.metadata import version
 from pathlib import Path
 
 from benchmarks.sides import Row, command, row
+from mtcsirl.files.storage import write_json
 from mtcsirl.settings import Settings
 from mtcsirl.settings.runs import AgentRunSettings, baseline_run
-from mtcsirl.storage import write_json
 
 TASK = "reach-wall"
 START_STEPS, MEMORY_STEPS = 2, 2_000
@@ -30,7 +30,7 @@ _PEER = """
 import json, sys
 import torch
 from stable_baselines3 import SAC
-from mtcsirl.fast_metaworld.identity import stock_environment
+from mtcsirl.worlds.fast.identity import stock_environment
 
 torch.set_num_threads(1)
 steps, keywords = json.loads(sys.argv[1])

@@ -4,8 +4,11 @@ import os
 from pathlib import Path
 
 import pytest
+import torch
 
 from mtcsirl.cli import THREADS
+from mtcsirl.settings import SacSettings
+from mtcsirl.settings.runs import AgentRunSettings
 
 for _name in THREADS:
     os.environ.setdefault(_name, "1")
@@ -16,3 +19,27 @@ CHECKOUT = Path(__file__).resolve().parents[1]
 @pytest.fixture(scope="session")
 def checkout() -> Path:
     return CHECKOUT
+
+
+@pytest.fixture(autouse=True)
+def _one_thread() -> None:
+    torch.set_num_threads(1)
+
+
+@pytest.fixture
+def small_sac() -> SacSettings:
+    """A learner that trains in seconds."""
+    return SacSettings(hidden_sizes=(16, 16), minibatch=32, random_steps=100, updates_per_step=0.1)
+
+
+@pytest.fixture
+def small_run() -> AgentRunSettings:
+    """A run that trains in seconds."""
+    return AgentRunSettings(
+        steps=300,
+        cs_weight=2.0,
+        curriculum=True,
+        sac={"hidden_sizes": (16, 16), "minibatch": 32, "random_steps": 100, "updates_per_step": 0.2},
+        evaluation={"episodes": 2, "episode_steps": 50},
+        progress={"checkpoint_every": 100, "select_every": 100, "select_episodes": 1},
+    )

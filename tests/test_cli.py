@@ -12,16 +12,17 @@ from pathlib import Path
 
 import pytest
 
-from mtcsirl import cli, storage
+from mtcsirl import cli
 from mtcsirl.commands.arguments import run_settings
-from mtcsirl.design import design
-from mtcsirl.outputs import OUTPUTS
-from mtcsirl.plan import Rates, cost, load_rates, plan, wall_hours
+from mtcsirl.files import storage
 from mtcsirl.settings import Settings
 from mtcsirl.settings.loading import load
 from mtcsirl.settings.runs import AgentRunSettings, expert_run
-from mtcsirl.status import DONE, FAILED, OUTDATED, RUNNING, WAITING, run_status, seconds_left, study_status
-from mtcsirl.study import Expert
+from mtcsirl.study.design import design
+from mtcsirl.study.outputs import OUTPUTS
+from mtcsirl.study.plan import Rates, cost, load_rates, plan, wall_hours
+from mtcsirl.study.runs import Expert
+from mtcsirl.study.status import DONE, FAILED, OUTDATED, RUNNING, WAITING, run_status, seconds_left, study_status
 
 KEY = ["--task", "reach", "--seed", "0"]
 

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from mtcsirl.design import ARTEFACTS, design
-from mtcsirl.plan import load_rates, plan
 from mtcsirl.settings import Settings
+from mtcsirl.study.design import ARTEFACTS, design
+from mtcsirl.study.plan import load_rates, plan
 from tests.conftest import CHECKOUT
 
 SOURCE = CHECKOUT / "src" / "mtcsirl"
@@ -38,14 +38,14 @@ def test_methods_name_every_equation_and_artefact():
     for number in range(1, 12):
         assert re.search(rf"^\| eq\. [\d, ]*\b{number}\b", text, re.MULTILINE), f"equation {number}"
     files = {file for file, _ in references()}
-    assert {"analysis/claims.py", "analysis/rows.py", "irl/curriculum.py", "irl/losses.py"} <= files
+    assert {"claims/claims.py", "results/rows.py", "rewards/curriculum.py", "irl/losses.py"} <= files
 
 
 def test_statistics_of_the_methods_page_exist():
     text = (CHECKOUT / "docs" / "methods.md").read_text(encoding="utf-8").split("## Statistics")[1]
     named = set(re.findall(r"\| `(\w+)` \|$", text, re.MULTILINE))
     assert len(named) == 10
-    assert named <= words(SOURCE / "analysis" / "statistics.py")
+    assert named <= words(SOURCE / "results" / "statistics.py")
 
 
 @pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: path.name)

@@ -3,7 +3,7 @@
 from benchmarks import gates
 
 from mtcsirl.settings.loading import load
-from mtcsirl.together import train_together
+from mtcsirl.stages.together import train_together
 
 
 def test_agents_train_once_and_are_listed_with_their_gates(tmp_path, capsys):

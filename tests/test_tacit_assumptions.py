@@ -11,11 +11,11 @@ from gymnasium import spaces
 from metaworld.env_dict import ALL_V3_ENVIRONMENTS
 from metaworld.sawyer_xyz_env import SawyerXYZEnv
 
-from mtcsirl.environments import EPISODE_STEPS, STEP_SECONDS
-from mtcsirl.fast_metaworld.environment import FastEnvironment
-from mtcsirl.fast_metaworld.identity import stock_environment
+from mtcsirl.names import TARGETS_PER_TASK, TASKS
 from mtcsirl.rewards import ground_truth
-from mtcsirl.tasks import TARGETS_PER_TASK, TASKS
+from mtcsirl.worlds.environments import EPISODE_STEPS, STEP_SECONDS
+from mtcsirl.worlds.fast.environment import FastEnvironment
+from mtcsirl.worlds.fast.identity import stock_environment
 
 STILL = np.zeros(4, np.float32)
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 import torch
 
-from mtcsirl.agents.relabelling import PolicyReward, RewardMixture, ground_truth
 from mtcsirl.agents.replay import Replay
-from mtcsirl.environments import OBSERVATION_MAPS
+from mtcsirl.rewards.mixture import PolicyReward, RewardMixture, ground_truth
+from mtcsirl.worlds.environments import OBSERVATION_MAPS
 from tests.agents.made_up import random_transitions
 
 AGENTS = 2

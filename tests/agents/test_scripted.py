@@ -6,9 +6,9 @@ import pytest
 from mtcsirl.agents.jobs import AgentJob
 from mtcsirl.agents.scripted import ScriptedExplorers
 from mtcsirl.agents.training import Training
-from mtcsirl.environments import make_environment
 from mtcsirl.settings.loading import load
 from mtcsirl.settings.runs import baseline_run, irl_run
+from mtcsirl.worlds.environments import make_environment
 
 
 def explorers(*steps, noise=0.3, observation="mapped"):

@@ -8,9 +8,9 @@ import pytest
 
 from mtcsirl.agents import training as training_module
 from mtcsirl.agents.jobs import AgentJob, gate_score
-from mtcsirl.agents.relabelling import ground_truth
 from mtcsirl.agents.training import Training, train_agents
 from mtcsirl.errors import UserError
+from mtcsirl.rewards.mixture import ground_truth
 
 WRITTEN = ("curve.csv", "evaluation.csv", "gate.json", "policy.json", "policy.safetensors")
 

@@ -10,9 +10,9 @@ from pathlib import Path
 
 import pytest
 
-from mtcsirl.design import ARTEFACTS
 from mtcsirl.settings import Settings
 from mtcsirl.settings.loading import load
+from mtcsirl.study.design import ARTEFACTS
 
 SMOKE = ("--configfile", "config/smoke.yaml")
 RENDERED = ("figure_8", "figure_9")

@@ -4,9 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from mtcsirl.ablations import ABLATIONS
-from mtcsirl.design import ARTEFACTS, design
 from mtcsirl.settings.loading import load
+from mtcsirl.study.ablations import ABLATIONS
+from mtcsirl.study.design import ARTEFACTS, design
 from tests.dag.conftest import Snakemake, job_counts
 
 

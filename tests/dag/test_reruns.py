@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from mtcsirl.design import ARTEFACTS, design
 from mtcsirl.settings import Settings
-from mtcsirl.study import IrlRun, Transfer
+from mtcsirl.study.design import ARTEFACTS, design
+from mtcsirl.study.runs import IrlRun, Transfer
 from tests.dag.conftest import SMOKE, TARGETS, Snakemake, job_counts
 
 pytestmark = pytest.mark.dag

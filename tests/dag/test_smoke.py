@@ -9,14 +9,15 @@ import pandas as pd
 import pytest
 import torch
 
-from mtcsirl import cli, storage
-from mtcsirl.agents.policy import load_policy
-from mtcsirl.design import ARTEFACTS, design
-from mtcsirl.outputs import OUTPUTS
+from mtcsirl import cli
+from mtcsirl.episodes.policy import load_policy
+from mtcsirl.files import storage
 from mtcsirl.rewards.learned import load_learned_reward
 from mtcsirl.settings import Settings
-from mtcsirl.status import DONE, study_status
-from mtcsirl.study import Baseline, Expert, IrlRun, Study, Transfer
+from mtcsirl.study.design import ARTEFACTS, design
+from mtcsirl.study.outputs import OUTPUTS
+from mtcsirl.study.runs import Baseline, Expert, IrlRun, Study, Transfer
+from mtcsirl.study.status import DONE, study_status
 from tests.dag.conftest import RENDERED, RENDERS, SMOKE, Snakemake, needs_rendering
 
 pytestmark = pytest.mark.dag

@@ -5,10 +5,10 @@ from itertools import product
 import numpy as np
 import pandas as pd
 
-from mtcsirl.design import design
 from mtcsirl.figures.data import FigureData
 from mtcsirl.settings import Settings
-from mtcsirl.study import Baseline, Expert, IrlRun, Transfer
+from mtcsirl.study.design import design
+from mtcsirl.study.runs import Baseline, Expert, IrlRun, Transfer
 
 STEPS = np.arange(1_000, 40_001, 1_000)
 TARGETS = {"velocity": 0.8, "action_norm": 3.0}

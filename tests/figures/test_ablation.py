@@ -3,9 +3,9 @@
 import pandas as pd
 import pytest
 
-from mtcsirl.ablations import ABLATIONS
 from mtcsirl.figures.ablation import STAGES, caption, draw, variant_rows
 from mtcsirl.settings import Settings
+from mtcsirl.study.ablations import ABLATIONS
 
 SETTINGS = Settings()
 

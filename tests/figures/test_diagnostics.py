@@ -7,7 +7,7 @@ import pytest
 
 from mtcsirl.figures.diagnostics import CHANCE, caption, draw
 from mtcsirl.figures.style import SMOKE_NOTE, figure_bytes
-from mtcsirl.outputs import DIAGNOSTIC_COLUMNS
+from mtcsirl.study.outputs import DIAGNOSTIC_COLUMNS
 
 MEMBERS = (("reach", 1), ("drawer-close", 2))
 OF_GENERATOR = [

@@ -7,12 +7,12 @@ import sys
 import numpy as np
 import pytest
 
-from mtcsirl.environments import make_environment
 from mtcsirl.errors import UserError
 from mtcsirl.figures import figure_8, figure_9
 from mtcsirl.figures.data import FigureData
-from mtcsirl.rendering import CameraPose, SceneRenderer, camera_pose
 from mtcsirl.settings import Settings
+from mtcsirl.worlds.environments import make_environment
+from mtcsirl.worlds.rendering import CameraPose, SceneRenderer, camera_pose
 
 SIZE = (320, 240)
 
@@ -51,7 +51,7 @@ def test_unknown_camera_names_the_allowed_ones(environment):
 
 def test_machine_without_osmesa_is_told_the_package():
     program = (
-        "from mtcsirl.rendering import SceneRenderer\n"
+        "from mtcsirl.worlds.rendering import SceneRenderer\n"
         "from mtcsirl.errors import UserError\n"
         "import mujoco\n"
         "try:\n    SceneRenderer(mujoco.MjModel.from_xml_string('<mujoco/>'), width=8, height=8)\n"

@@ -4,7 +4,6 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from mtcsirl.analysis.statistics import Estimate
 from mtcsirl.figures.data import FigureData
 from mtcsirl.figures.scatter import (
     SHOWN_POINTS,
@@ -15,6 +14,7 @@ from mtcsirl.figures.scatter import (
     standardise,
 )
 from mtcsirl.figures.style import new_figure
+from mtcsirl.results.statistics import Estimate
 
 KEY = {"experiment": "single_target", "method": "mt_csirl", "cs_reward": "velocity", "source": "reach-wall"}
 

@@ -5,7 +5,8 @@ from pathlib import Path
 import pytest
 
 from mtcsirl.agents.sac import FusedSac
-from mtcsirl.demonstrations import collect_demonstrations
+from mtcsirl.episodes.demonstrations import collect_demonstrations
+from mtcsirl.files.storage import write_parquet
 from mtcsirl.settings import (
     DiscriminatorSettings,
     EvaluationSettings,
@@ -14,7 +15,6 @@ from mtcsirl.settings import (
     ProgressSettings,
 )
 from mtcsirl.settings.runs import DemonstrationRunSettings, IrlRunSettings
-from mtcsirl.storage import write_parquet
 
 MEMBERS = (("reach", 1), ("drawer-close", 2))
 

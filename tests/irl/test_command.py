@@ -1,7 +1,7 @@
 """`mtcsirl learn-reward` on files of one's own: settings are those of the tasks demonstrated, not of all tasks."""
 
 from mtcsirl.cli import main
-from mtcsirl.storage import read_json
+from mtcsirl.files.storage import read_json
 from tests.irl.conftest import MEMBERS
 
 

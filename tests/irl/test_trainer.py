@@ -8,16 +8,16 @@ import pandas as pd
 import pytest
 import torch
 
-from mtcsirl.agents.lockstep import Outcome
+from mtcsirl.episodes.lockstep import Outcome
 from mtcsirl.errors import UserError
+from mtcsirl.files.storage import checksum
 from mtcsirl.irl.methods import METHODS
 from mtcsirl.irl.methods.base import Setup
 from mtcsirl.irl.rollout import collect
 from mtcsirl.irl.run import CHECKPOINT, learn_reward, make_trainer
 from mtcsirl.irl.trainer import IrlTrainer
-from mtcsirl.outputs import CURVE_COLUMNS, DIAGNOSTIC_COLUMNS
 from mtcsirl.rewards.learned import load_learned_reward
-from mtcsirl.storage import checksum
+from mtcsirl.study.outputs import CURVE_COLUMNS, DIAGNOSTIC_COLUMNS
 from mtcsirl.transitions import Transitions
 from tests.irl.conftest import MEMBERS, irl_settings
 

@@ -3,7 +3,6 @@
 from dataclasses import replace
 from functools import cache
 
-from mtcsirl.design import ARTEFACTS
 from mtcsirl.figures.style import figure_bytes, new_figure
 from mtcsirl.report.content import (
     Claim,
@@ -16,6 +15,7 @@ from mtcsirl.report.content import (
     TargetLine,
     WhatWasRun,
 )
+from mtcsirl.study.design import ARTEFACTS
 
 FIGURES = [name for name in ARTEFACTS if name.startswith("figure_")]
 VERDICTS = ("reproduced", "partially", "not reproduced", "inconclusive", "precondition not met", "not run")

@@ -6,17 +6,17 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from mtcsirl import storage
-from mtcsirl.analysis.claims import claims_json, judge
-from mtcsirl.analysis.rows import ROW_COLUMNS, SCORE_COLUMNS
-from mtcsirl.design import ARTEFACTS, design
+from mtcsirl.claims.claims import claims_json, judge
 from mtcsirl.errors import UserError
 from mtcsirl.figures.style import figure_bytes, new_figure
-from mtcsirl.outputs import OUTPUTS
+from mtcsirl.files import storage
 from mtcsirl.report.collect import collect
 from mtcsirl.report.markdown import parse_table
 from mtcsirl.report.page import build_report
+from mtcsirl.results.rows import ROW_COLUMNS, SCORE_COLUMNS
 from mtcsirl.settings import Settings
+from mtcsirl.study.design import ARTEFACTS, design
+from mtcsirl.study.outputs import OUTPUTS
 
 TABLE = """**Table 1.** Ratio to the
 target.

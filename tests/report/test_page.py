@@ -7,7 +7,7 @@ from html.parser import HTMLParser
 
 import pytest
 
-from mtcsirl.analysis.unit_text import COLUMNS
+from mtcsirl.claims.unit_text import COLUMNS
 from mtcsirl.report.page import build_report
 from tests.report.browser import CHROMIUM, inspect
 from tests.report.made_up import FIGURES, made_up_report

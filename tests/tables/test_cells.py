@@ -2,7 +2,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from mtcsirl.analysis.statistics import Summary
+from mtcsirl.results.statistics import Summary
 from mtcsirl.tables.cells import make_cell
 
 UNKNOWN = Summary(np.nan, np.nan, 0)

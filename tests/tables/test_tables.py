@@ -5,12 +5,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from mtcsirl.analysis.rows import select
-from mtcsirl.design import design
+from mtcsirl.results.rows import select
 from mtcsirl.settings import Settings
+from mtcsirl.study.design import design
 from mtcsirl.tables import TABLES
 from mtcsirl.tables.table import Column, Line, Table
-from tests.analysis.made_up import evaluation
+from tests.results.made_up import evaluation
 
 SETTINGS = Settings(
     methods=("mt_airl", "mt_vairl", "mt_csirl", "mt_csirl_lt"),

@@ -48,7 +48,7 @@ def test_speed_is_the_second_action_and_the_truth_is_highest_at_its_target() -> 
 
 
 def test_a_potential_is_removed_whole_and_the_truth_stays() -> None:
-    from mtcsirl.analysis.correlation import remove
+    from mtcsirl.results.correlation import remove
 
     moves = uniform_transitions(2_000, UNSEEN, np.random.default_rng(0))
     (x, y, cos, _), (x2, y2, cos2, _) = moves.observation.numpy().T, moves.next_observation.numpy().T

@@ -7,7 +7,7 @@ for ablation in ABLATIONS:
             ablation
         input:
             rows=rows_of(ablation),
-            code=code("ablations.py", "figures/ablation.py", "analysis/rows.py"),
+            code=code("ablations.py", "figures/ablation.py", "results/rows.py"),
         output:
             csv=f"<results>/ablations/{ablation}.csv",
             pdf=f"<figures>/{ablation}.pdf",

@@ -6,16 +6,16 @@ from pathlib import Path
 
 from snakemake.exceptions import WorkflowError
 
-from mtcsirl.ablations import ABLATIONS
-from mtcsirl.design import ARTEFACTS, design
+from mtcsirl.study.ablations import ABLATIONS
+from mtcsirl.study.design import ARTEFACTS, design
 from mtcsirl.errors import UserError
 from mtcsirl.extensions import VARIABLE
-from mtcsirl.outputs import OUTPUTS
+from mtcsirl.study.outputs import OUTPUTS
 from mtcsirl.settings import Settings
 from mtcsirl.settings.loading import validate
 from mtcsirl.settings.template import as_json
-from mtcsirl.sources import sources
-from mtcsirl.tasks import TASKS
+from mtcsirl.study.sources import sources
+from mtcsirl.names import TASKS
 
 try:
     SETTINGS = validate(Settings, config)

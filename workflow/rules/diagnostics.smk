@@ -27,7 +27,7 @@ rule diagnostics:
     input:
         rows=[path for run in STUDY.irl_runs for path in files(run, "diagnostics.csv", "gate.json")],
         figures=[f"<figures>/diagnostics/{run.folder}.png" for run in STUDY.irl_runs],
-        code=code("analysis/diagnosis.py"),
+        code=code("results/diagnosis.py"),
     output:
         csv="<results>/diagnostics/diagnostics.csv",
         markdown="<results>/diagnostics/diagnostics.md",

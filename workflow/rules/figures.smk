@@ -17,8 +17,8 @@ for figure in FIGURES:
             figure
         input:
             rows=rows_of(figure),
-            published=PACKAGE / "published.yaml",
-            code=code(f"figures/{figure}.py", "analysis/rows.py", "rendering.py"),
+            published=PACKAGE / "results/published.yaml",
+            code=code(f"figures/{figure}.py", "results/rows.py", "rendering.py"),
         output:
             pdf=f"<figures>/{figure}.pdf",
             png=report(

@@ -60,7 +60,7 @@ rule reward_quality:
     """Every scored reward against the truth, over seeds; no part of `all`."""
     input:
         scores=[path for run in STUDY.scores for path in files(run, "scores.csv", "points.parquet")],
-        code=code("analysis/reward_quality.py"),
+        code=code("results/reward_quality.py"),
     output:
         csv="<results>/scores/reward_quality.csv",
         markdown="<results>/scores/reward_quality.md",

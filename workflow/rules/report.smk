@@ -5,8 +5,8 @@ rule claims:
     """Verdict per claim, from the rows of every run."""
     input:
         rows=rows_of(None),
-        published=PACKAGE / "published.yaml",
-        criteria=PACKAGE / "analysis/claims.yaml",
+        published=PACKAGE / "results/published.yaml",
+        criteria=PACKAGE / "claims/claims.yaml",
         code=code("claims"),
     output:
         json="<results>/claims/claims.json",

@@ -30,8 +30,8 @@ for table in TABLES:
             table
         input:
             rows=rows_of(table),
-            published=PACKAGE / "published.yaml",
-            code=code(f"tables/{table}.py", "analysis/rows.py", *["tables/heatmaps.py"][: table in HEAT_MAPS]),
+            published=PACKAGE / "results/published.yaml",
+            code=code(f"tables/{table}.py", "results/rows.py", *["figures/heat_maps.py"][: table in HEAT_MAPS]),
         output:
             csv=f"<results>/tables/{table}.csv",
             markdown=report(

@@ -10,11 +10,11 @@ from typing import Any, Literal
 
 import pandas as pd
 
-from mtcsirl import storage
-from mtcsirl.agents.policy import Policy, save_policy
-from mtcsirl.agents.relabelling import RewardMixture
+from mtcsirl.episodes.evaluation import COLUMNS, Row, metric_limit, relative_distance
+from mtcsirl.episodes.policy import Policy, save_policy
 from mtcsirl.errors import UserError
-from mtcsirl.evaluation import COLUMNS, Row, metric_limit, relative_distance
+from mtcsirl.files import storage
+from mtcsirl.rewards.mixture import RewardMixture
 from mtcsirl.settings.runs import AgentRunSettings
 from mtcsirl.transitions import RewardFunction
 

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from mtcsirl.agents.sac import FusedSac
-from mtcsirl.environments import ACTION_SIZE, OBSERVATION_SIZE
 from mtcsirl.settings import SacSettings
+from mtcsirl.worlds.environments import ACTION_SIZE, OBSERVATION_SIZE
 
 if TYPE_CHECKING:
     from mtcsirl.agents.reference import ReferenceSac

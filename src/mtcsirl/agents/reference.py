@@ -19,8 +19,8 @@ from stable_baselines3.common.type_aliases import ReplayBufferSamples
 from torch import Tensor
 
 from mtcsirl.agents.networks import NetworkStack
-from mtcsirl.agents.policy import Policy
 from mtcsirl.agents.sac import FusedSac
+from mtcsirl.episodes.policy import Policy
 from mtcsirl.errors import UserError
 
 if TYPE_CHECKING:

@@ -26,7 +26,7 @@ from mtcsirl.agents.gaussian import (
 from mtcsirl.agents.graph import CudaGraph
 from mtcsirl.agents.networks import NetworkStack, Workspace
 from mtcsirl.agents.optimiser import FlatAdam
-from mtcsirl.agents.policy import Policy
+from mtcsirl.episodes.policy import Policy
 
 if TYPE_CHECKING:
     from mtcsirl.settings import SacSettings

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mtcsirl.environments import OBSERVATION_MAPS
+from mtcsirl.worlds.environments import OBSERVATION_MAPS
 
 if TYPE_CHECKING:
     from metaworld.policies.policy import Policy

@@ -14,19 +14,19 @@ import numpy as np
 import pandas as pd
 import torch
 
-from mtcsirl import storage
-from mtcsirl.agents.checkpoint import load_checkpoint, prefixed, save_checkpoint, without_prefix
 from mtcsirl.agents.held import HeldExplorers
 from mtcsirl.agents.jobs import AgentJob, TrainedAgent, gate_score, shared_settings
 from mtcsirl.agents.learners import make_learner
-from mtcsirl.agents.lockstep import TaskEnvironments, make_environments
-from mtcsirl.agents.policy import Policy
 from mtcsirl.agents.progress import Progress
-from mtcsirl.agents.relabelling import PolicyReward
 from mtcsirl.agents.replay import Replay
 from mtcsirl.agents.scripted import ScriptedExplorers
-from mtcsirl.environments import ACTION_SIZE
-from mtcsirl.evaluation import gate_verdict, measure_episode, stochastic_means
+from mtcsirl.episodes.evaluation import gate_verdict, measure_episode, stochastic_means
+from mtcsirl.episodes.lockstep import TaskEnvironments, make_environments
+from mtcsirl.episodes.policy import Policy
+from mtcsirl.files import storage
+from mtcsirl.files.checkpoint import load_checkpoint, prefixed, save_checkpoint, without_prefix
+from mtcsirl.rewards.mixture import PolicyReward
+from mtcsirl.worlds.environments import ACTION_SIZE
 
 
 def train_agents(

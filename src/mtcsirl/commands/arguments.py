@@ -8,12 +8,12 @@ from typing import Any, TypeVar
 
 from pydantic import BaseModel
 
-from mtcsirl.ablations import ABLATIONS
-from mtcsirl.design import ARTEFACTS
 from mtcsirl.errors import UserError
+from mtcsirl.names import TARGETS_PER_TASK, TASKS
 from mtcsirl.settings import Settings
 from mtcsirl.settings.loading import load, override, read_yaml, validate
-from mtcsirl.tasks import TARGETS_PER_TASK, TASKS
+from mtcsirl.study.ablations import ABLATIONS
+from mtcsirl.study.design import ARTEFACTS
 
 Model = TypeVar("Model", bound=BaseModel)
 Verbs = Any

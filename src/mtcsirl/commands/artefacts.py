@@ -4,17 +4,17 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
-from mtcsirl.ablations import ABLATIONS
 from mtcsirl.commands.arguments import Verbs, add_study_settings, add_verb, study_settings
 from mtcsirl.commands.drawing import write_figure
-from mtcsirl.design import ARTEFACTS, design
 from mtcsirl.settings import Settings
-from mtcsirl.study import Run
+from mtcsirl.study.ablations import ABLATIONS
+from mtcsirl.study.design import ARTEFACTS, design
+from mtcsirl.study.runs import Run
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from mtcsirl.analysis.claims import Finding
+    from mtcsirl.claims.claims import Finding
 
 AnyRun = TypeVar("AnyRun", bound=Run)
 HEAT_MAPS = {"table_1": "action_norm", "table_3": "velocity"}
@@ -77,8 +77,8 @@ def _add(
 
 
 def _table(parsed: argparse.Namespace) -> None:
-    from mtcsirl.analysis.rows import evaluation_rows
-    from mtcsirl.storage import write_csv, write_text
+    from mtcsirl.files.storage import write_csv, write_text
+    from mtcsirl.results.rows import evaluation_rows
     from mtcsirl.tables import TABLES
 
     settings = study_settings(parsed)
@@ -90,7 +90,7 @@ def _table(parsed: argparse.Namespace) -> None:
     write_text(folder / f"{name}.md", table.markdown())
     write_text(folder / f"{name}.tex", table.latex())
     if name in HEAT_MAPS:
-        from mtcsirl.tables.heatmaps import heat_map, heat_map_caption
+        from mtcsirl.figures.heat_maps import heat_map, heat_map_caption
 
         cs_reward = HEAT_MAPS[name]
         write_figure(folder / name, heat_map(cs_reward, rows, settings), heat_map_caption(cs_reward, settings))
@@ -98,9 +98,9 @@ def _table(parsed: argparse.Namespace) -> None:
 
 
 def _figure(parsed: argparse.Namespace) -> None:
-    from mtcsirl.analysis.rows import curve_rows, point_rows, score_rows
     from mtcsirl.figures import figure_spec
     from mtcsirl.figures.data import FigureData
+    from mtcsirl.results.rows import curve_rows, point_rows, score_rows
 
     settings = study_settings(parsed)
     name = f"figure_{parsed.number}"
@@ -115,8 +115,8 @@ def _figure(parsed: argparse.Namespace) -> None:
 
 
 def _reward_quality(parsed: argparse.Namespace) -> None:
-    from mtcsirl.analysis.reward_quality import quality_markdown, read_quality
     from mtcsirl.figures.style import scale_notes
+    from mtcsirl.results.reward_quality import quality_markdown, read_quality
 
     settings = study_settings(parsed)
     runs = _there(design(settings).scores, settings, "points.parquet", parsed.partial)
@@ -126,8 +126,8 @@ def _reward_quality(parsed: argparse.Namespace) -> None:
 
 
 def _diagnostics(parsed: argparse.Namespace) -> None:
-    from mtcsirl.analysis.diagnosis import diagnoses_markdown, read_diagnoses
     from mtcsirl.figures.style import scale_notes
+    from mtcsirl.results.diagnosis import diagnoses_markdown, read_diagnoses
 
     settings = study_settings(parsed)
     runs = _there(design(settings).irl_runs, settings, "gate.json", parsed.partial)
@@ -143,7 +143,7 @@ def _there(runs: tuple[AnyRun, ...], settings: Settings, name: str, partial: boo
 
 def _write_summary(path: Path, rows: "pd.DataFrame", text: str) -> None:
     """Write rows as ``path``.csv and ``text`` as ``path``.md, and print it."""
-    from mtcsirl.storage import write_csv, write_text
+    from mtcsirl.files.storage import write_csv, write_text
 
     write_csv(path.with_suffix(".csv"), rows)
     write_text(path.with_suffix(".md"), text)
@@ -151,10 +151,10 @@ def _write_summary(path: Path, rows: "pd.DataFrame", text: str) -> None:
 
 
 def _ablation(parsed: argparse.Namespace) -> None:
-    from mtcsirl.analysis.rows import evaluation_rows
-    from mtcsirl.design import variants
     from mtcsirl.figures.ablation import caption, draw, variant_rows
-    from mtcsirl.storage import write_csv
+    from mtcsirl.files.storage import write_csv
+    from mtcsirl.results.rows import evaluation_rows
+    from mtcsirl.study.design import variants
 
     settings, name = study_settings(parsed), parsed.name
     shown = variants(settings, name)
@@ -167,9 +167,9 @@ def _ablation(parsed: argparse.Namespace) -> None:
 
 
 def _claims(parsed: argparse.Namespace) -> None:
-    from mtcsirl.analysis.claims import claims_json, claims_markdown
-    from mtcsirl.analysis.claims_figure import CAPTION, claims_figure
-    from mtcsirl.storage import write_json, write_text
+    from mtcsirl.claims.claims import claims_json, claims_markdown
+    from mtcsirl.figures.claims import CAPTION, claims_figure
+    from mtcsirl.files.storage import write_json, write_text
 
     settings = study_settings(parsed)
     findings = _judged(settings, parsed.partial)
@@ -184,9 +184,9 @@ def _claims(parsed: argparse.Namespace) -> None:
 def _judged(settings: Settings, partial: bool) -> "list[Finding]":
     import pandas as pd
 
-    from mtcsirl.analysis.claims import judge
-    from mtcsirl.analysis.rows import ablated_generators, evaluation_rows, score_rows
-    from mtcsirl.design import variants
+    from mtcsirl.claims.claims import judge
+    from mtcsirl.results.rows import ablated_generators, evaluation_rows, score_rows
+    from mtcsirl.study.design import variants
 
     study, name = design(settings), "ablation_curriculum"
     rows = evaluation_rows(study, settings.results, partial=partial)
@@ -196,10 +196,10 @@ def _judged(settings: Settings, partial: bool) -> "list[Finding]":
 
 
 def _results(parsed: argparse.Namespace) -> None:
-    from mtcsirl.analysis.results_page import results_page
-    from mtcsirl.analysis.rows import evaluation_rows
-    from mtcsirl.provenance import commit, machine
-    from mtcsirl.storage import write_text
+    from mtcsirl.files.provenance import commit, machine
+    from mtcsirl.files.storage import write_text
+    from mtcsirl.report.results_page import results_page
+    from mtcsirl.results.rows import evaluation_rows
     from mtcsirl.tables import TABLES
 
     settings = study_settings(parsed)
@@ -212,9 +212,9 @@ def _results(parsed: argparse.Namespace) -> None:
 
 
 def _report(parsed: argparse.Namespace) -> None:
+    from mtcsirl.files.storage import write_text
     from mtcsirl.report.collect import collect
     from mtcsirl.report.page import build_report
-    from mtcsirl.storage import write_text
 
     settings = study_settings(parsed)
     page = (parsed.output or Path(settings.results) / "report") / "index.html"

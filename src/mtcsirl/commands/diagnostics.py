@@ -23,10 +23,10 @@ def register(verbs: Verbs) -> None:
 
 
 def _draw(parsed: argparse.Namespace) -> None:
-    from mtcsirl import storage
     from mtcsirl.figures.diagnostics import caption, draw
     from mtcsirl.figures.style import look, quantity
-    from mtcsirl.outputs import CURVE_COLUMNS, DIAGNOSTIC_COLUMNS
+    from mtcsirl.files import storage
+    from mtcsirl.study.outputs import CURVE_COLUMNS, DIAGNOSTIC_COLUMNS
 
     settings = study_settings(parsed)
     about = storage.read_json(parsed.folder / "reward.json")

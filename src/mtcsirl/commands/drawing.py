@@ -10,7 +10,7 @@ if TYPE_CHECKING:
 def write_figure(path: Path, figure: "Figure", caption: str) -> None:
     """Write ``path`` with the endings .pdf and .png in place of its own."""
     from mtcsirl.figures.style import figure_bytes
-    from mtcsirl.storage import write_bytes
+    from mtcsirl.files.storage import write_bytes
 
     write_bytes(path.with_suffix(".pdf"), figure_bytes(figure, "pdf", caption))
     write_bytes(path.with_suffix(".png"), figure_bytes(figure, "png", caption))

@@ -33,13 +33,13 @@ def register(verbs: Verbs) -> None:
 
 
 def _export_policy(parsed: argparse.Namespace) -> None:
-    from mtcsirl.agents.export import export_sb3
+    from mtcsirl.exports.sb3 import export_sb3
 
     export_sb3(parsed.policy, parsed.output)
     print(parsed.output)
 
 
 def _export_demonstrations(parsed: argparse.Namespace) -> None:
-    from mtcsirl.minari_dataset import export_minari
+    from mtcsirl.exports.minari import export_minari
 
     print(export_minari(parsed.demonstrations, parsed.output, parsed.name))

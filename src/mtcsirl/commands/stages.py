@@ -33,8 +33,8 @@ def register(verbs: Verbs) -> None:
 
 def _train_expert(verbs: Verbs) -> None:
     def run(parsed: argparse.Namespace) -> None:
-        from mtcsirl import stages
         from mtcsirl.settings.runs import AgentRunSettings, expert_run
+        from mtcsirl.stages import training as stages
 
         settings = run_settings(parsed, AgentRunSettings, lambda s: expert_run(s, parsed.task, parsed.cs_reward))
         job = stages.expert_job(settings, parsed.task, parsed.target, parsed.cs_reward, parsed.seed)
@@ -55,8 +55,8 @@ def _train_expert(verbs: Verbs) -> None:
 
 def _train_sac(verbs: Verbs) -> None:
     def run(parsed: argparse.Namespace) -> None:
-        from mtcsirl import stages
         from mtcsirl.settings.runs import AgentRunSettings, baseline_run
+        from mtcsirl.stages import training as stages
 
         settings = run_settings(parsed, AgentRunSettings, lambda s: baseline_run(s, parsed.task))
         stages.train(stages.sac_job(settings, parsed.task, parsed.target, parsed.seed), parsed.output)
@@ -76,8 +76,8 @@ def _train_sac(verbs: Verbs) -> None:
 
 def _collect_demonstrations(verbs: Verbs) -> None:
     def run(parsed: argparse.Namespace) -> None:
-        from mtcsirl import stages
         from mtcsirl.settings.runs import DemonstrationRunSettings, demonstration_run
+        from mtcsirl.stages import training as stages
 
         settings = run_settings(parsed, DemonstrationRunSettings, demonstration_run)
         stages.collect_demonstrations(
@@ -101,9 +101,9 @@ def _collect_demonstrations(verbs: Verbs) -> None:
 
 def _learn_reward(verbs: Verbs) -> None:
     def run(parsed: argparse.Namespace) -> None:
-        from mtcsirl import stages
-        from mtcsirl.demonstrations import task_of
+        from mtcsirl.episodes.demonstrations import task_of
         from mtcsirl.settings.runs import IrlRunSettings, irl_run
+        from mtcsirl.stages import training as stages
 
         files = parsed.demonstrations
         experiment = "multi_task" if len(files) > 1 else "single_target"
@@ -133,8 +133,8 @@ def _learn_reward(verbs: Verbs) -> None:
 
 def _transfer(verbs: Verbs) -> None:
     def run(parsed: argparse.Namespace) -> None:
-        from mtcsirl import stages
         from mtcsirl.settings.runs import AgentRunSettings, transfer_run
+        from mtcsirl.stages import training as stages
 
         settings = run_settings(parsed, AgentRunSettings, lambda s: transfer_run(s, parsed.task))
         job = stages.transfer_job(
@@ -170,8 +170,8 @@ def _transfer(verbs: Verbs) -> None:
 
 def _score_reward(verbs: Verbs) -> None:
     def run(parsed: argparse.Namespace) -> None:
-        from mtcsirl import stages
         from mtcsirl.settings.runs import ScoreRunSettings, score_run
+        from mtcsirl.stages import training as stages
 
         settings = run_settings(parsed, ScoreRunSettings, score_run)
         stages.score_reward(
@@ -205,10 +205,10 @@ def _evaluate(verbs: Verbs) -> None:
     def run(parsed: argparse.Namespace) -> None:
         import pandas as pd
 
-        from mtcsirl.agents.policy import load_policy
-        from mtcsirl.evaluation import COLUMNS, evaluate
+        from mtcsirl.episodes.evaluation import COLUMNS, evaluate
+        from mtcsirl.episodes.policy import load_policy
+        from mtcsirl.files.storage import write_csv
         from mtcsirl.settings.runs import AgentRunSettings, baseline_run
-        from mtcsirl.storage import write_csv
 
         settings = run_settings(parsed, AgentRunSettings, lambda s: baseline_run(s, parsed.task))
         policy = load_policy(parsed.policy)

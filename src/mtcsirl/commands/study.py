@@ -6,13 +6,13 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from mtcsirl.ablations import ABLATIONS
 from mtcsirl.commands.arguments import Verbs, add_artefact, add_study_settings, add_verb, study_settings
-from mtcsirl.design import ARTEFACTS, design
+from mtcsirl.study.ablations import ABLATIONS
+from mtcsirl.study.design import ARTEFACTS, design
 
 if TYPE_CHECKING:
-    from mtcsirl.plan import Rates
     from mtcsirl.settings import Settings
+    from mtcsirl.study.plan import Rates
 
 
 def register(verbs: Verbs) -> None:
@@ -75,7 +75,7 @@ def register(verbs: Verbs) -> None:
 
 
 def _plan(parsed: argparse.Namespace) -> None:
-    from mtcsirl.plan import CALIBRATION, load_rates, plan, wall_hours
+    from mtcsirl.study.plan import CALIBRATION, load_rates, plan, wall_hours
 
     settings, rates = study_settings(parsed), load_rates(parsed.rates or CALIBRATION)
     stages = plan(design(settings, parsed.target), settings, rates)
@@ -94,7 +94,7 @@ def _plan(parsed: argparse.Namespace) -> None:
 
 def _print_artefacts(settings: "Settings", rates: "Rates") -> None:
     """Jobs and core-hours of every artefact asked for alone; artefacts share runs, so these add up to more."""
-    from mtcsirl.plan import plan
+    from mtcsirl.study.plan import plan
 
     lines = []
     for name in (*ARTEFACTS, *ABLATIONS):
@@ -105,8 +105,8 @@ def _print_artefacts(settings: "Settings", rates: "Rates") -> None:
 
 
 def _status(parsed: argparse.Namespace) -> None:
-    from mtcsirl.plan import load_rates
-    from mtcsirl.status import FAILED, RUNNING, STATES, seconds_left, study_status
+    from mtcsirl.study.plan import load_rates
+    from mtcsirl.study.status import FAILED, RUNNING, STATES, seconds_left, study_status
 
     settings = study_settings(parsed)
     statuses = study_status(design(settings, parsed.target), settings)
@@ -162,8 +162,8 @@ def _settings(parsed: argparse.Namespace) -> None:
 
 
 def _calibrate(parsed: argparse.Namespace) -> None:
-    from mtcsirl.calibration import calibrate
-    from mtcsirl.storage import write_json
+    from mtcsirl.files.storage import write_json
+    from mtcsirl.study.calibration import calibrate
 
     write_json(parsed.output, calibrate().model_dump(mode="json"))
     print(parsed.output)

@@ -25,8 +25,8 @@ def register(verbs: Verbs) -> None:
 
 
 def _run(parsed: argparse.Namespace) -> None:
-    from mtcsirl.design import design
-    from mtcsirl.together import train_together
+    from mtcsirl.stages.together import train_together
+    from mtcsirl.study.design import design
 
     settings = study_settings(parsed)
     runs = [run for run in design(settings, parsed.target) if run.stage in parsed.stages]

@@ -23,7 +23,7 @@ def register(verbs: Verbs) -> None:
 
 
 def _validate(parsed: argparse.Namespace) -> None:
-    from mtcsirl.storage import write_csv
+    from mtcsirl.files.storage import write_csv
     from mtcsirl.validation.figure import caption, draw
     from mtcsirl.validation.study import ValidationSettings, validate
 

@@ -31,7 +31,7 @@ def register(verbs: Verbs) -> None:
 
 
 def _video(parsed: argparse.Namespace) -> None:
-    from mtcsirl.video import clip_of, render_video
+    from mtcsirl.exports.video import clip_of, render_video
 
     if parsed.label and len(parsed.label) != len(parsed.folders):
         raise UserError(f"--label: {len(parsed.label)} labels for {len(parsed.folders)} folders; give one per folder")

@@ -6,7 +6,6 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from mtcsirl.ablations import ABLATIONS
 from mtcsirl.figures.style import (
     COLOURS,
     NO_RUNS,
@@ -22,6 +21,7 @@ from mtcsirl.figures.style import (
     target_of,
 )
 from mtcsirl.settings import Settings
+from mtcsirl.study.ablations import ABLATIONS
 
 LOOKS = tuple(zip(COLOURS, "oDs^", strict=False))
 """Colour and marker of the variants in their order."""

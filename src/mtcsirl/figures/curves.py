@@ -8,8 +8,8 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from mtcsirl.analysis.statistics import summarise, t_interval
 from mtcsirl.figures.style import NO_RUNS, NOT_ASKED, TARGET_COLOUR, Look, empty_panel, quantity_label, step_axis
+from mtcsirl.results.statistics import summarise, t_interval
 
 BINS = 40
 

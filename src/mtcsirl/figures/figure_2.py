@@ -2,9 +2,9 @@
 
 from matplotlib.figure import Figure
 
-from mtcsirl.design import FIGURE_TASKS
 from mtcsirl.figures import single_target
 from mtcsirl.figures.data import FigureData
+from mtcsirl.study.design import FIGURE_TASKS
 
 TITLE = "Single task cs-reward: reach-wall"
 _TASK = FIGURE_TASKS["figure_2"]

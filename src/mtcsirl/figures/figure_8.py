@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from mtcsirl.figures.data import FigureData
 from mtcsirl.figures.style import INK, NOTE_COLOUR, TEXT_WIDTH, new_figure, scale_notes, styled
-from mtcsirl.rendering import Image, camera_pose
 from mtcsirl.settings import Settings
-from mtcsirl.study import EVALUATION_TARGET
+from mtcsirl.study.runs import EVALUATION_TARGET
+from mtcsirl.worlds.rendering import Image, camera_pose
 
 TITLE = "Train and test tasks of the three experiments"
 Scene = tuple[str, int]
@@ -78,7 +78,7 @@ def draw(data: FigureData) -> Figure:
 
 def shoot(scene: Scene, target_seed: int) -> Shot:
     """Render the first state of a task and target."""
-    from mtcsirl.environments import make_environment
+    from mtcsirl.worlds.environments import make_environment
 
     environment = make_environment(*scene, observation="raw", target_seed=target_seed, render=True)
     observation, _ = environment.reset()

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from mtcsirl.figures.data import FigureData
 from mtcsirl.figures.style import TEXT_WIDTH, new_figure, scale_notes, styled
-from mtcsirl.rendering import Image, SceneRenderer, camera_pose
+from mtcsirl.worlds.rendering import Image, SceneRenderer, camera_pose
 
 TITLE = "Sawyer robot with its end effector"
 _CAMERA = "corner"
@@ -28,7 +28,7 @@ def draw(data: FigureData) -> Figure:
 
 def end_effector_scene() -> tuple[Image, NDArray[np.float64]]:
     """The picture of the robot and the pixel (column, row) of the hand, observation entries 0:3."""
-    from mtcsirl.environments import make_environment
+    from mtcsirl.worlds.environments import make_environment
 
     environment = make_environment("reach", 0, observation="raw")
     observation, _ = environment.reset()

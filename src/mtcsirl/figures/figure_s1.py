@@ -5,9 +5,9 @@ The paper's text names this task, none of its figures shows it.
 
 from matplotlib.figure import Figure
 
-from mtcsirl.design import FIGURE_TASKS
 from mtcsirl.figures import single_target
 from mtcsirl.figures.data import FigureData
+from mtcsirl.study.design import FIGURE_TASKS
 
 TITLE = "Single task cs-reward: drawer-close"
 _TASK = FIGURE_TASKS["figure_s1"]

@@ -1,11 +1,11 @@
 """Shared by Figures 3 and 7: the reward learned from several tasks, on unseen tasks (section 5.3)."""
 
-from mtcsirl.design import design
 from mtcsirl.figures.curves import Series
 from mtcsirl.figures.data import FigureData, rows_where
 from mtcsirl.figures.scatter import Correlation, select_correlation
 from mtcsirl.figures.style import LOOKS
-from mtcsirl.study import EVALUATION_TARGET
+from mtcsirl.study.design import design
+from mtcsirl.study.runs import EVALUATION_TARGET
 
 EXPERIMENT, METHOD, SOURCE = "multi_task", "mt_csirl", "all"
 

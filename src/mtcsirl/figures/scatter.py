@@ -7,7 +7,6 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from mtcsirl.analysis.statistics import Estimate, mean_correlation
 from mtcsirl.figures.data import FigureData, rows_where
 from mtcsirl.figures.style import (
     NO_RUNS,
@@ -21,7 +20,8 @@ from mtcsirl.figures.style import (
     scale_notes,
     styled,
 )
-from mtcsirl.published import load_published
+from mtcsirl.results.published import load_published
+from mtcsirl.results.statistics import Estimate, mean_correlation
 
 SHOWN_POINTS = 2000
 PRIMARY_TRANSITIONS = "sac"

@@ -3,7 +3,6 @@
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from mtcsirl.design import design
 from mtcsirl.figures.curves import Series, add_legend, counts, draw_curves, missing_note
 from mtcsirl.figures.data import FigureData, rows_where
 from mtcsirl.figures.scatter import Correlation, draw_scatter, scatter_caption, select_correlation
@@ -19,7 +18,8 @@ from mtcsirl.figures.style import (
     target_of,
 )
 from mtcsirl.settings.runs import irl_run
-from mtcsirl.study import EVALUATION_TARGET
+from mtcsirl.study.design import design
+from mtcsirl.study.runs import EVALUATION_TARGET
 
 EXPERIMENT, METHOD = "single_target", "mt_csirl"
 SCATTER_CS_REWARD = "velocity"

@@ -17,7 +17,7 @@ from torch import Tensor
 
 from mtcsirl.agents.gaussian import squashed_log_prob
 from mtcsirl.agents.networks import NetworkStack
-from mtcsirl.agents.policy import Policy
+from mtcsirl.episodes.policy import Policy
 from mtcsirl.settings import SacSettings
 from mtcsirl.transitions import Transitions
 

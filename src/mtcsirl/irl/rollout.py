@@ -7,7 +7,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from mtcsirl.agents.lockstep import Environments, Outcome
+from mtcsirl.episodes.lockstep import Environments, Outcome
 from mtcsirl.transitions import RewardFunction, Transitions
 
 

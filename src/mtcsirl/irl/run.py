@@ -14,23 +14,23 @@ import pandas as pd
 import torch
 from torch import Tensor
 
-from mtcsirl.agents.lockstep import make_environments
-from mtcsirl.agents.policy import Policy, save_policy
-from mtcsirl.agents.relabelling import ground_truth
-from mtcsirl.demonstrations import load_demonstrations
-from mtcsirl.environments import OBSERVATION_MAPS
+from mtcsirl.episodes.demonstrations import load_demonstrations
+from mtcsirl.episodes.evaluation import COLUMNS, evaluate, gate_verdict, measure_episode, stochastic_means
+from mtcsirl.episodes.lockstep import make_environments
+from mtcsirl.episodes.policy import Policy, save_policy
 from mtcsirl.errors import UserError
-from mtcsirl.evaluation import COLUMNS, evaluate, gate_verdict, measure_episode, stochastic_means
+from mtcsirl.files.storage import checksum, read_tensors, remove, write_csv, write_json, write_parquet, write_tensors
 from mtcsirl.irl.methods import METHODS
 from mtcsirl.irl.methods.base import Setup
 from mtcsirl.irl.rollout import World
 from mtcsirl.irl.trainer import IrlTrainer
-from mtcsirl.outputs import CURVE_COLUMNS, DIAGNOSTIC_COLUMNS
 from mtcsirl.rewards.ground_truth import COMMON_SENSE_REWARDS
 from mtcsirl.rewards.learned import LearnedReward, save_learned_reward
+from mtcsirl.rewards.mixture import ground_truth
 from mtcsirl.settings.runs import IrlRunSettings
-from mtcsirl.storage import checksum, read_tensors, remove, write_csv, write_json, write_parquet, write_tensors
+from mtcsirl.study.outputs import CURVE_COLUMNS, DIAGNOSTIC_COLUMNS
 from mtcsirl.transitions import Transitions
+from mtcsirl.worlds.environments import OBSERVATION_MAPS
 
 CHECKPOINT = "checkpoint.safetensors"
 SAMPLED_ROLLOUTS = 10

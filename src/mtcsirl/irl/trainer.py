@@ -7,12 +7,11 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from mtcsirl.agents.checkpoint import prefixed, without_prefix
 from mtcsirl.agents.learners import make_learner
-from mtcsirl.agents.lockstep import Outcome
 from mtcsirl.agents.replay import Replay
 from mtcsirl.agents.scripted import ScriptedExplorers
-from mtcsirl.irl.curriculum import R_MAX, Curriculum
+from mtcsirl.episodes.lockstep import Outcome
+from mtcsirl.files.checkpoint import prefixed, without_prefix
 from mtcsirl.irl.densities import Densities
 from mtcsirl.irl.diagnostics import (
     Row,
@@ -24,6 +23,7 @@ from mtcsirl.irl.diagnostics import (
 from mtcsirl.irl.discriminator import Batch, Discriminator, Method
 from mtcsirl.irl.losses import clamp_log_pi
 from mtcsirl.irl.rollout import World, collect, gather
+from mtcsirl.rewards.curriculum import R_MAX, Curriculum
 from mtcsirl.rewards.networks import RewardNetwork
 from mtcsirl.settings import SacSettings
 from mtcsirl.settings.runs import IrlRunSettings

@@ -5,12 +5,10 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from mtcsirl import storage
-from mtcsirl.design import ARTEFACTS, design
 from mtcsirl.errors import UserError
 from mtcsirl.figures import figure_spec
 from mtcsirl.figures.style import caption_of
-from mtcsirl.outputs import OUTPUTS
+from mtcsirl.files import storage
 from mtcsirl.report.content import (
     Claim,
     DeviationLine,
@@ -25,7 +23,9 @@ from mtcsirl.report.content import (
 from mtcsirl.report.markdown import parse_table
 from mtcsirl.settings import Settings
 from mtcsirl.settings.template import deviations
-from mtcsirl.study import Run, Study
+from mtcsirl.study.design import ARTEFACTS, design
+from mtcsirl.study.outputs import OUTPUTS
+from mtcsirl.study.runs import Run, Study
 
 SUMMARY_TARGETS = {"claims": "the verdicts on all claims", "report": "this page", "all": "everything"}
 

@@ -6,7 +6,7 @@ from importlib import resources
 from jinja2 import Environment, FunctionLoader, StrictUndefined
 from markupsafe import Markup
 
-from mtcsirl.analysis.unit_text import COLUMNS
+from mtcsirl.claims.unit_text import COLUMNS
 from mtcsirl.report.content import FigureView, ReportData
 from mtcsirl.tables.cells import LINES
 

@@ -7,8 +7,8 @@ from typing import Any
 
 from torch import Tensor
 
-from mtcsirl import storage
 from mtcsirl.errors import UserError
+from mtcsirl.files import storage
 from mtcsirl.rewards.networks import RewardNetwork
 from mtcsirl.transitions import RewardFunction, Transitions
 

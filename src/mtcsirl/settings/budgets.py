@@ -5,7 +5,7 @@ from typing import Annotated, TypeVar
 
 from pydantic import AfterValidator, Field
 
-from mtcsirl.tasks import TASKS
+from mtcsirl.names import TASKS
 
 
 def known_task(name: str) -> str:

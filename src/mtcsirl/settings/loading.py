@@ -9,8 +9,8 @@ import yaml
 from pydantic import BaseModel, ValidationError
 
 from mtcsirl.errors import UserError
+from mtcsirl.files.storage import read_text
 from mtcsirl.settings.study import Settings
-from mtcsirl.storage import read_text
 
 Model = TypeVar("Model", bound=BaseModel)
 CONFIG_FOLDERS = (Path("config"), Path(__file__).resolve().parents[3] / "config")

@@ -7,6 +7,7 @@ from pydantic import AfterValidator, Field, model_validator
 
 from mtcsirl.extensions import load_extensions
 from mtcsirl.irl.methods import METHODS as METHOD_REGISTRY
+from mtcsirl.names import TARGETS_PER_TASK
 from mtcsirl.rewards.ground_truth import COMMON_SENSE_REWARDS
 from mtcsirl.settings.base import Frozen, key
 from mtcsirl.settings.budgets import Budget, Iterations, Shares, Task
@@ -19,7 +20,6 @@ from mtcsirl.settings.learner import (
     ProgressSettings,
     RewardScaleSettings,
 )
-from mtcsirl.tasks import TARGETS_PER_TASK
 
 SINGLE_TASKS = ("reach-wall", "button-press-topdown-wall", "drawer-close", "push-back", "coffee-button")
 TRAIN_TASKS = ("window-open", "reach", "plate-slide", "faucet-open", "coffee-button", "door-close")

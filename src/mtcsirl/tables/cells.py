@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from mtcsirl.analysis.rows import BELOW_GATE, DUPLICATED, FOREIGN, MISSING, matrix, select
-from mtcsirl.analysis.statistics import (
+from mtcsirl.results.rows import BELOW_GATE, DUPLICATED, FOREIGN, MISSING, matrix, select
+from mtcsirl.results.statistics import (
     UNKNOWN,
     Estimate,
     Interval,

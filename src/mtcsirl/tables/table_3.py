@@ -2,7 +2,7 @@
 
 import pandas as pd
 
-from mtcsirl.published import Published, load_published
+from mtcsirl.results.published import Published, load_published
 from mtcsirl.settings import Settings
 from mtcsirl.tables.cross_transfer import cross_transfer_table
 from mtcsirl.tables.table import Table

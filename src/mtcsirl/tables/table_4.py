@@ -2,8 +2,8 @@
 
 import pandas as pd
 
-from mtcsirl.analysis.rows import select
-from mtcsirl.published import Published, in_paper_order, load_published
+from mtcsirl.results.published import Published, in_paper_order, load_published
+from mtcsirl.results.rows import select
 from mtcsirl.settings import Settings
 from mtcsirl.tables.cells import Cell, make_cell
 from mtcsirl.tables.table import Column, Entry, Table, result_table

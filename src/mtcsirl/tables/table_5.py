@@ -4,7 +4,7 @@ from typing import Any
 
 import pandas as pd
 
-from mtcsirl.published import Published, load_published
+from mtcsirl.results.published import Published, load_published
 from mtcsirl.settings import Settings
 from mtcsirl.tables.cells import DASH
 from mtcsirl.tables.table import Column, Line, Table, deviation_notes, differences, scale_notes

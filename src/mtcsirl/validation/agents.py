@@ -5,9 +5,9 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 import torch
 
-from mtcsirl.agents.lockstep import Outcome
 from mtcsirl.agents.replay import Replay
 from mtcsirl.agents.sac import FusedSac
+from mtcsirl.episodes.lockstep import Outcome
 from mtcsirl.irl.rollout import Act, collect
 from mtcsirl.settings import SacSettings
 from mtcsirl.transitions import RewardFunction, Transitions

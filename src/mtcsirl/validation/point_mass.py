@@ -17,7 +17,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from mtcsirl.agents.lockstep import Outcome
+from mtcsirl.episodes.lockstep import Outcome
 from mtcsirl.transitions import Transitions
 
 STATE_SIZE, ACTION_SIZE = 4, 2

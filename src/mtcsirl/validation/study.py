@@ -11,11 +11,11 @@ import numpy as np
 import pandas as pd
 import torch
 
-from mtcsirl.analysis.correlation import pearson, remove
 from mtcsirl.irl.methods import METHODS
 from mtcsirl.irl.methods.base import Setup
 from mtcsirl.irl.rollout import World
 from mtcsirl.irl.trainer import IrlTrainer
+from mtcsirl.results.correlation import pearson, remove
 from mtcsirl.rewards.networks import RewardNetwork
 from mtcsirl.settings import DiscriminatorSettings, EvaluationSettings, IrlSettings, LearnerSettings
 from mtcsirl.settings.runs import IrlRunSettings

@@ -1,1 +1,0 @@
-"""From tidy rows to statistics, correlations and verdicts."""

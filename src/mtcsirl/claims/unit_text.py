@@ -1,0 +1,92 @@
+"""One judged unit in words: our number and the paper's, the claim's criterion, and other criteria side by side.
+
+Replication studies report several criteria since none decides alone: whether ours lies where the original predicts a
+replication, whether the original lies in our interval, whether the effect differs from nothing, and its size.
+"""
+
+import numpy as np
+
+from mtcsirl.claims.judging import CORRELATION, Unit
+from mtcsirl.results.statistics import Estimate, Interval, Summary
+
+DASH = "–"
+COLUMNS = {
+    "unit": "unit",
+    "judged": "judged",
+    "paper": "paper",
+    "ours": "ours",
+    "measure": "what the criterion looks at",
+    "ours_in_prediction": "ours in the paper's prediction interval",
+    "paper_in_interval": "paper's in our t-interval",
+    "difference": "differs from the reference (Welch)",
+    "effect": "Hedges' g against the reference",
+    "why": "why",
+}
+"""Key and heading of each text, in the order in which they are printed."""
+
+
+def unit_texts(unit: Unit) -> dict[str, str]:
+    """The texts of ``COLUMNS``; intervals are 95 %, a dash says that the criterion does not apply."""
+    return {
+        "unit": f"{unit.cs_reward.replace('_', ' ')}, {unit.what}",
+        "judged": unit.state,
+        "paper": "no number" if np.isnan(unit.paper.mean) else _spread(unit.paper),
+        "ours": _ours(unit),
+        "measure": _measure(unit),
+        "ours_in_prediction": _contains(unit.prediction, unit.ours.mean),
+        "paper_in_interval": _contains(unit.interval, unit.paper.mean),
+        "difference": _difference(unit),
+        "effect": _effect(unit),
+        "why": unit.reason,
+    }
+
+
+def _ours(unit: Unit) -> str:
+    if unit.ours.n == 0:
+        return DASH
+    success = "" if np.isnan(unit.success.mean) else f", success {100 * unit.success.mean:.0f} %"
+    return f"{_spread(unit.ours)}, n={unit.ours.n}{success}"
+
+
+def _measure(unit: Unit) -> str:
+    """As in "part of SAC's gap closed: 0.84 [0.80, 0.88]; paper 0.83"."""
+    if unit.value.n == 0 or np.isnan(unit.value.value):
+        return DASH
+    paper = "" if np.isnan(unit.paper_value) or unit.measure == CORRELATION else f"; paper {unit.paper_value:.2f}"
+    return f"{unit.measure}: {_estimate(unit.value)}{paper}"
+
+
+def _difference(unit: Unit) -> str:
+    test = unit.difference
+    if test is None or np.isnan(test.p):
+        return DASH
+    sure = "yes" if test.p < 0.05 else "no"
+    p = "p < 0.001" if test.p < 0.001 else f"p = {test.p:.3f}"
+    return f"{unit.reference}: {sure}, {test.difference:+.2f}{_bounds(Interval(test.low, test.high))}, {p}"
+
+
+def _effect(unit: Unit) -> str:
+    if not unit.reference or np.isnan(unit.effect.value):
+        return DASH
+    closer = "" if np.isnan(unit.closer) else f"; closer with probability {unit.closer:.2f}"
+    g = _estimate(unit.effect, 1) if np.isfinite(unit.effect.value) else "infinite (no spread)"
+    return f"{g}{closer}"
+
+
+def _contains(interval: Interval, value: float) -> str:
+    """As in "yes [0.61, 0.85]"; a dash where there is no interval or nothing to look for in it."""
+    if np.isnan(interval.low) or np.isnan(value):
+        return DASH
+    return f"{'yes' if interval.contains(value) else 'no'}{_bounds(interval)}"
+
+
+def _spread(summary: Summary) -> str:
+    return f"{summary.mean:.2f}" + ("" if np.isnan(summary.std) else f"±{summary.std:.2f}")
+
+
+def _estimate(estimate: Estimate, digits: int = 2) -> str:
+    return f"{estimate.value:.{digits}f}{_bounds(Interval(estimate.low, estimate.high), digits)}"
+
+
+def _bounds(interval: Interval, digits: int = 2) -> str:
+    return "" if np.isnan(interval.low) else f" [{interval.low:.{digits}f}, {interval.high:.{digits}f}]"

@@ -1,0 +1,1 @@
+"""What happens in episodes: policies, environments in lockstep, evaluation, gates, demonstrations."""

@@ -1,0 +1,1 @@
+"""Results for other tools: stable-baselines3, Minari, videos."""

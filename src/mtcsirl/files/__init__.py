@@ -1,0 +1,1 @@
+"""Files: the one way to them, checkpoints, where a run came from."""

@@ -1,0 +1,94 @@
+"""Where a run came from and what it cost: ``provenance.json``."""
+
+import functools
+import importlib.metadata
+import os
+import platform
+import resource
+import subprocess
+import time
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from mtcsirl.files.storage import checksum, write_json
+
+PACKAGES = ("metaworld", "mujoco", "gymnasium", "torch", "numpy", "stable-baselines3", "snakemake")
+
+
+@functools.cache
+def commit() -> str:
+    """Git commit of the code, "+" appended if the working tree differs, "unknown" outside a checkout."""
+    folder = Path(__file__).resolve().parent
+
+    def git(*words: str) -> str:
+        return subprocess.run(["git", *words], cwd=folder, capture_output=True, text=True, check=True).stdout.strip()
+
+    try:
+        return git("rev-parse", "HEAD") + ("+" if git("status", "--porcelain", "--untracked-files=no") else "")
+    except (OSError, subprocess.CalledProcessError):
+        return "unknown"
+
+
+def machine() -> dict[str, Any]:
+    """Processor, cores and operating system."""
+    model = platform.processor()
+    cpuinfo = Path("/proc/cpuinfo")
+    if cpuinfo.is_file():
+        names = [
+            line.split(":", 1)[1].strip() for line in cpuinfo.read_text().splitlines() if line.startswith("model name")
+        ]
+        model = names[0] if names else model
+    return {
+        "processor": model,
+        "cores": os.cpu_count(),
+        "system": platform.platform(),
+        "python": platform.python_version(),
+    }
+
+
+def _versions() -> dict[str, str]:
+    found = {}
+    for name in PACKAGES:
+        try:
+            found[name] = importlib.metadata.version(name)
+        except importlib.metadata.PackageNotFoundError:
+            continue
+    return found
+
+
+class Stopwatch:
+    """Wall seconds, CPU seconds and peak memory since it was made; ``spent`` carries what earlier tries used."""
+
+    def __init__(self, spent: dict[str, float] | None = None) -> None:
+        self._wall = time.monotonic()
+        self._cpu = time.process_time()
+        self._spent = spent or {"wall_seconds": 0.0, "cpu_seconds": 0.0}
+
+    def read(self, agents: int = 1) -> dict[str, float]:
+        """The cost so far, resumed tries included; time is shared by ``agents`` runs."""
+        peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+        return {
+            "wall_seconds": round((self._spent["wall_seconds"] + time.monotonic() - self._wall) / agents, 3),
+            "cpu_seconds": round((self._spent["cpu_seconds"] + time.process_time() - self._cpu) / agents, 3),
+            "peak_memory_mib": round(peak, 1),
+        }
+
+
+def write_provenance(
+    folder: Path | str, stopwatch: Stopwatch, inputs: Mapping[str, Path] | None = None, *, agents: int = 1
+) -> None:
+    """Write ``provenance.json`` into a run folder: commit, versions, machine, cost, checksums of the inputs.
+
+    ``agents``: how many runs the process made at once; each bears its share of the time.
+    """
+    write_json(
+        Path(folder) / "provenance.json",
+        {
+            "commit": commit(),
+            "versions": _versions(),
+            "machine": machine(),
+            "cost": stopwatch.read(agents),
+            "inputs": {name: checksum(path) for name, path in sorted((inputs or {}).items())},
+        },
+    )

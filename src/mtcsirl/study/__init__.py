@@ -1,0 +1,1 @@
+"""What a run is: the experimental design as data, its outputs, its cost, how far it is."""

@@ -1,0 +1,80 @@
+"""Made-up results of a study, as frames and as files."""
+
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import Any
+from zlib import crc32
+
+import numpy as np
+import pandas as pd
+
+from mtcsirl.files import storage
+from mtcsirl.results.rows import KEY, OK, POLICIES, ROW_COLUMNS, agents, metrics, run_key
+from mtcsirl.study.runs import Demonstrations, Study
+
+Means = Callable[[dict[str, Any]], dict[str, float]]
+"""Means of the metrics of an agent, from its key."""
+
+
+def noise(agent: dict[str, Any], metric: str, policy: str) -> float:
+    """One number in [-1, 1] for each agent, metric and policy, the same in every process."""
+    text = "|".join(str(agent[name]) for name in KEY) + metric + policy
+    return crc32(text.encode()) / 2**31 - 1
+
+
+def evaluation(study: Study, means: Means, spread: float = 0.0) -> pd.DataFrame:
+    """Rows as ``evaluation_rows`` gives them, every run present, value = mean (1 + spread x noise)."""
+    keys, rows = _frame(study)
+    centres = [{"success": 1.0, "velocity": 0.3, "action_norm": 1.6, "task_reward": 8.0} | means(key) for key in keys]
+    pairs = zip(rows["agent"], rows["metric"], strict=True)
+    centre = np.array([centres[agent][metric] for agent, metric in pairs])
+    return rows.assign(value=centre * (1 + spread * rows["noise"]))[list(ROW_COLUMNS)]
+
+
+@cache
+def _frame(study: Study) -> tuple[list[dict[str, Any]], pd.DataFrame]:
+    """The keys of all agents, and their rows without values."""
+    keys, rows = [], []
+    for run in study:
+        for key in agents(run):
+            keys.append(key)
+            own = key | {"agent": len(keys) - 1, "episodes": 10, "status": OK, "folder": f"results/{run.folder}"}
+            for policy in POLICIES:
+                for metric in metrics(study):
+                    jitter = noise(key, metric, policy)
+                    rows.append(own | {"policy": policy, "metric": metric, "noise": jitter})
+    for run in study.demonstrations:
+        keys.append(run_key(run) | {"task": run.task, "target": run.target, "seed": run.expert.seed})
+        own = keys[-1] | {"agent": len(keys) - 1, "episodes": 0, "status": OK, "folder": f"results/{run.folder}"}
+        rows += [
+            own | {"policy": "stochastic", "metric": metric, "noise": 0.0} for metric in ("success", run.cs_reward)
+        ]
+    return keys, pd.DataFrame(rows)
+
+
+def write_demonstrations(run: Demonstrations, results: Path, *, passed: bool = True) -> None:
+    """The gate of one expert's demonstrations."""
+    gate = {"gate": "expert", "passed": passed, "success": 1.0 if passed else 0.6, "metric": 0.75}
+    storage.write_json(results / run.folder / "gate.json", gate)
+
+
+def write_run(run: Any, results: Path, means: Means, *, episodes: int = 2, passed: bool = True) -> None:
+    """The files of one run that evaluates agents."""
+    rows, curve = [], []
+    for agent in agents(run):
+        values = {"success": 1.0, "velocity": 0.3, "action_norm": 1.6, "task_reward": 8.0} | means(agent)
+        own = {name: agent[name] for name in ("task", "target", "cs_reward", "seed")}
+        for policy in POLICIES:
+            for metric in values:
+                centre = values[metric] + 0.01 * noise(agent, metric, policy)
+                shifts = np.linspace(-0.1, 0.1, episodes)
+                rows += [
+                    own | {"policy": policy, "episode": i, "metric": metric, "value": centre + shift}
+                    for i, shift in enumerate(shifts)
+                ]
+        curve += [own | {"step": step, "metric": "velocity", "value": values["velocity"]} for step in (500, 1000)]
+    folder = results / run.folder
+    storage.write_csv(folder / "evaluation.csv", pd.DataFrame(rows))
+    storage.write_csv(folder / "curve.csv", pd.DataFrame(curve))
+    storage.write_json(folder / "gate.json", {"gate": "expert", "passed": passed})

@@ -1,0 +1,191 @@
+import re
+import shutil
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from mtcsirl.errors import UserError
+from mtcsirl.files import storage
+from mtcsirl.results import rows as rows_module
+from mtcsirl.results.rows import (
+    ablated_generators,
+    curve_rows,
+    evaluation_rows,
+    matrix,
+    point_rows,
+    score_rows,
+    select,
+)
+from mtcsirl.settings import Settings
+from mtcsirl.study.design import design, variants
+from tests.results.made_up import write_demonstrations, write_run
+
+SETTINGS = Settings(
+    seeds=(0, 1, 2),
+    irl_seeds=(0,),
+    cs_rewards=("velocity",),
+    methods=("mt_csirl",),
+    single_target={"tasks": ("reach-wall",)},
+    multi_target={"tasks": ("reach-wall",), "train_targets": (1,)},
+    multi_task={"train_tasks": ("reach", "door-close"), "train_targets": (1,), "unseen_tasks": ("push-back",)},
+)
+STUDY = design(SETTINGS, "table_2")
+SPEEDS = {"train_expert": 0.8, "train_sac": 0.3, "learn_reward": 0.7, "transfer": 0.75}
+
+
+def means(agent):
+    return {"velocity": SPEEDS[agent["stage"]]}
+
+
+@pytest.fixture
+def results(tmp_path):
+    for run in STUDY:
+        if run.stage in SPEEDS:
+            write_run(run, tmp_path, means)
+    for run in STUDY.demonstrations:
+        write_demonstrations(run, tmp_path)
+    return tmp_path
+
+
+def velocity(rows, **key):
+    return select(rows, metric="velocity", policy="stochastic", **key)
+
+
+def test_every_agent_of_the_study_with_its_mean_over_episodes(results):
+    rows = evaluation_rows(STUDY, results)
+    assert set(rows["status"]) == {"ok"}
+    agents = rows[rows["stage"] != "collect_demonstrations"].drop_duplicates(list(rows_module.KEY))
+    members = sum(len(run.members) for run in STUDY.irl_runs)
+    assert len(agents) == len(STUDY.experts) + len(STUDY.baselines) + members + len(STUDY.transfers)
+    for stage, speed in SPEEDS.items():
+        values = velocity(rows, stage=stage)
+        assert values["value"].to_numpy() == pytest.approx(speed, abs=0.011)
+        assert (values["episodes"] == 2).all()
+
+
+def test_matrix_is_seeds_by_tasks_and_refuses_a_mixture(results):
+    rows = evaluation_rows(STUDY, results)
+    transfers = velocity(rows, stage="transfer")
+    assert matrix(transfers).shape == (3, 1)
+    with pytest.raises(ValueError, match="more than one row"):
+        matrix(velocity(rows, stage=["transfer", "train_sac"]))
+
+
+def test_missing_run_stops_the_full_load_with_the_command_that_makes_it(results):
+    shutil.rmtree(results / STUDY.transfers[1].folder)
+    with pytest.raises(UserError) as error:
+        evaluation_rows(STUDY, results)
+    named = re.search(r"snakemake --cores 1 (\S+)`", str(error.value))
+    assert named is not None
+    assert named[1] == str(results / STUDY.transfers[1].folder / "evaluation.csv")
+    assert "\n" not in str(error.value)
+
+
+def test_missing_run_stays_in_the_partial_frame(results):
+    shutil.rmtree(results / STUDY.transfers[1].folder)
+    rows = velocity(evaluation_rows(STUDY, results, partial=True), stage="transfer")
+    assert rows["status"].tolist() == ["ok", "missing", "ok"]
+    assert rows["value"].isna().tolist() == [False, True, False]
+
+
+def test_nothing_there_yet_is_a_frame_of_missing_runs(tmp_path):
+    rows = evaluation_rows(STUDY, tmp_path, partial=True)
+    assert set(rows["status"]) == {"missing"}
+    assert rows["value"].isna().all()
+    for load in (curve_rows, score_rows, point_rows):
+        assert load(design(SETTINGS), tmp_path, partial=True).empty
+        with pytest.raises(UserError, match="is missing"):
+            load(design(SETTINGS), tmp_path)
+
+
+def test_generators_of_an_ablation_carry_its_name(tmp_path):
+    """They have the keys of the main study's generators, which they must not be taken for."""
+    study = variants(SETTINGS, "ablation_curriculum")["constant"]
+    missing = ablated_generators(study, tmp_path, "ablation_curriculum")
+    for run in study.irl_runs:
+        write_run(run, tmp_path, means)
+    rows = ablated_generators(study, tmp_path, "ablation_curriculum")
+    assert set(missing["status"]) == {"missing"}
+    assert set(rows["status"]) == {"ok"}
+    assert set(rows["stage"]) == {"learn_reward"}
+    assert set(rows["experiment"]) == {"ablation_curriculum"}
+    assert set(rows["task"]) == set(SETTINGS.ablations.tasks)
+
+
+def test_agent_below_its_gate_counts_and_is_marked(results):
+    write_run(STUDY.experts[0], results, means, passed=False)
+    rows = velocity(evaluation_rows(STUDY, results), stage="train_expert", task=STUDY.experts[0].task)
+    assert (rows["status"] == "below gate").sum() == 1
+    assert rows["value"].notna().all()
+
+
+def test_demonstrations_stand_beside_their_expert_with_their_own_gate(results):
+    rows = select(evaluation_rows(STUDY, results), stage="collect_demonstrations")
+    assert len(rows) == 2 * len(STUDY.demonstrations)
+    assert set(rows["status"]) == {"ok"}
+    assert set(rows["seed"]) == {SETTINGS.seeds[0]}
+    write_demonstrations(STUDY.demonstrations[0], results, passed=False)
+    rows = select(evaluation_rows(STUDY, results), stage="collect_demonstrations", task=STUDY.demonstrations[0].task)
+    assert set(rows["status"]) == {"below gate"}
+    assert select(rows, metric="success")["value"].tolist() == [0.6]
+    (results / STUDY.demonstrations[0].folder / "gate.json").unlink()
+    with pytest.raises(UserError, match="is missing"):
+        evaluation_rows(STUDY, results)
+    rows = select(evaluation_rows(STUDY, results, partial=True), stage="collect_demonstrations")
+    assert (rows["status"] == "missing").sum() == 2
+
+
+def test_copied_seed_is_flagged_and_not_averaged(results):
+    """A copy that still names seed 0, and one that was relabelled."""
+    first, second, third = (run for run in STUDY.transfers if run.task == "push-back")
+    shutil.copytree(results / first.folder, results / second.folder, dirs_exist_ok=True)
+    episodes = storage.read_csv(results / first.folder / "evaluation.csv")
+    storage.write_csv(results / third.folder / "evaluation.csv", episodes.assign(seed=third.seed))
+    rows = velocity(evaluation_rows(STUDY, results), stage="transfer")
+    assert rows["status"].tolist() == ["ok", "foreign", "duplicated"]
+    assert rows["value"].isna().tolist() == [False, True, True]
+
+
+def test_episode_twice_is_flagged(results):
+    path = results / STUDY.baselines[0].folder / "evaluation.csv"
+    episodes = storage.read_csv(path)
+    storage.write_csv(path, pd.concat([episodes, episodes]))
+    rows = velocity(evaluation_rows(STUDY, results), stage="train_sac", seed=STUDY.baselines[0].seed)
+    assert rows["status"].tolist() == ["duplicated"]
+    assert np.isnan(rows["value"]).all()
+
+
+def test_truncated_file_is_one_line(results):
+    path = results / STUDY.baselines[0].folder / "evaluation.csv"
+    storage.write_text(path, "task,target\n1,2,3,4\n")
+    with pytest.raises(UserError, match=r"evaluation\.csv"):
+        evaluation_rows(STUDY, results)
+
+
+def test_curves_carry_the_key_of_their_agent(results):
+    curves = curve_rows(STUDY, results)
+    generators = select(curves, stage="learn_reward")
+    assert set(generators["task"]) == {"reach", "door-close"}
+    assert len(generators) == 2 * len(STUDY.irl_runs[0].members)
+    assert set(select(curves, stage="transfer")["source"]) == {"all"}
+
+
+def test_scores_and_points_carry_the_key_of_their_reward(tmp_path):
+    study = design(SETTINGS)
+    for run in study.scores:
+        score = {
+            "transitions": "sac",
+            "reward": "learned",
+            "statistic": "pearson",
+            "value": 0.5,
+            "low": 0.4,
+            "high": 0.6,
+        }
+        storage.write_csv(tmp_path / run.folder / "scores.csv", pd.DataFrame([score | {"n": 10}]))
+        point = {"transitions": "sac", "episode": 0, "truth": -0.1, "learned": 0.2, "task_reward": 9.0}
+        storage.write_parquet(tmp_path / run.folder / "points.parquet", pd.DataFrame([point]))
+    scores, points = score_rows(study, tmp_path), point_rows(study, tmp_path)
+    assert len(scores) == len(points) == len(study.scores)
+    assert {"reach-wall", "push-back"} == set(scores["task"])
+    assert {"single_target", "multi_task"} == set(points["experiment"])
