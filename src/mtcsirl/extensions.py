@@ -13,6 +13,7 @@ from pathlib import Path
 from mtcsirl.errors import UserError
 
 VARIABLE = "MTCSIRL_EXTENSIONS"
+MODULE_PREFIX = "mtcsirl_extension_"
 
 
 def load_extensions(files: Iterable[str | Path]) -> None:
@@ -23,7 +24,7 @@ def load_extensions(files: Iterable[str | Path]) -> None:
     """
     for file in files:
         path = Path(file).resolve()
-        name = f"mtcsirl_extension_{path.stem}"
+        name = f"{MODULE_PREFIX}{path.stem}"
         known = sys.modules.get(name)
         if known is not None and known.__file__ == str(path):
             continue

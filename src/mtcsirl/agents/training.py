@@ -32,7 +32,7 @@ from mtcsirl.worlds.environments import ACTION_SIZE
 def train_agents(
     jobs: Sequence[AgentJob],
     *,
-    checkpoint: Path | str | None = None,
+    checkpoints: Sequence[Path] | None = None,
     log: Callable[[str], None] = print,
     events: Path | str | None = None,
     workers: int = 0,
@@ -45,6 +45,7 @@ def train_agents(
     Raises UserError when the jobs differ in more than task, target, seed, reward scale, cs_weight, curriculum or
     scripted steps.
     """
+    checkpoint = checkpoints[0] if checkpoints else None
     training = Training(jobs, checkpoint=checkpoint, log=log, events=events, workers=workers)
     try:
         training.run()

@@ -99,6 +99,15 @@ def add_output(verb: argparse.ArgumentParser, default: str | None = None) -> Non
     )
 
 
+def add_identity(verb: argparse.ArgumentParser) -> None:
+    """``--identity`` of a verb that a workflow calls."""
+    verb.add_argument(
+        "--identity",
+        metavar="HASH",
+        help="what a workflow planned for; a run that would be another is refused",
+    )
+
+
 def artefact(name: str) -> str:
     """An artefact or ablation of the design."""
     if name not in (*ARTEFACTS, *ABLATIONS):

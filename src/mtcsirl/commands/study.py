@@ -106,7 +106,7 @@ def _print_artefacts(settings: "Settings", rates: "Rates") -> None:
 
 def _status(parsed: argparse.Namespace) -> None:
     from mtcsirl.study.plan import load_rates
-    from mtcsirl.study.status import FAILED, RUNNING, STATES, seconds_left, study_status
+    from mtcsirl.study.status import FAILED, RUNNING, STALE, STATES, seconds_left, study_status
 
     settings = study_settings(parsed)
     statuses = study_status(design(settings, parsed.target), settings)
@@ -117,7 +117,7 @@ def _status(parsed: argparse.Namespace) -> None:
         counts = [sum(status.state == state for status in own) for state in STATES]
         lines.append((stage, *counts, f"{sum(gates)} of {len(gates)}" if gates else ""))
     _print_table(("stage", *STATES, "gates passed"), lines)
-    for state in (RUNNING, FAILED):
+    for state in (STALE, RUNNING, FAILED):
         for status in statuses:
             if status.state == state:
                 print(f"{state}: {status.run.folder}: {status.says}")

@@ -21,6 +21,7 @@ def register(verbs: Verbs) -> None:
     add_artefact(verb)
     verb.add_argument("--stages", nargs="+", choices=AGENT_STAGES, default=AGENT_STAGES, help="default: all three")
     verb.add_argument("--most", type=natural, default=16, metavar="N", help="agents in one batch; default 16")
+    verb.add_argument("--workers", type=natural, default=0, metavar="N", help="processes that step environments")
     add_study_settings(verb)
 
 
@@ -29,6 +30,6 @@ def _run(parsed: argparse.Namespace) -> None:
     from mtcsirl.study.design import design
 
     settings = study_settings(parsed)
-    runs = [run for run in design(settings, parsed.target) if run.stage in parsed.stages]
-    trained = train_together(runs, settings, Path(settings.results), most=max(1, parsed.most))
+    runs = [run for run in design(settings, parsed.target).agents if run.stage in parsed.stages]
+    trained = train_together(runs, settings, Path(settings.results), most=max(1, parsed.most), workers=parsed.workers)
     print(f"{trained} agents trained")

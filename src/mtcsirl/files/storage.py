@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
 from mtcsirl.errors import UserError
+from mtcsirl.files.identity import verify
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -42,6 +43,7 @@ def _read(path: Path | str, parse: Callable[[Path], Any], what: str) -> Any:
     path = Path(path)
     if not path.is_file():
         raise UserError(f"{path}: no such file; run the stage that makes it first")
+    verify(path)
     try:
         return parse(path)
     except UserError:

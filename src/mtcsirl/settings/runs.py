@@ -132,12 +132,11 @@ def transfer_run(settings: Settings, task: str) -> AgentRunSettings:
     )
 
 
-def demonstration_run(settings: Settings, experiments: tuple[str, ...] = ("multi_target",)) -> DemonstrationRunSettings:
-    """The settings of one expert's demonstrations: as many episodes as the hungriest of ``experiments`` reads."""
-    episodes = max(settings.demonstrations.episodes[name] for name in experiments)  # type: ignore[index]
+def demonstration_run(settings: Settings) -> DemonstrationRunSettings:
+    """The settings of one expert's demonstrations: as many episodes as the hungriest experiment reads."""
     return DemonstrationRunSettings(
         environment=settings.environment,
-        episodes=episodes,
+        episodes=max(settings.demonstrations.episodes.values()),
         episode_steps=settings.evaluation.episode_steps,
         gates=settings.gates,
     )

@@ -4,7 +4,7 @@ Every correlation says on which transitions it was taken: the same reward can co
 not at all on the expert's transitions, where there is nothing to explain.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple, cast
 
@@ -49,11 +49,11 @@ class _UniformActions:
 def score(
     settings: ScoreRunSettings,
     reward: Path,
-    expert: Path,
-    baseline: Path,
+    experts: Sequence[Path],
+    baselines: Sequence[Path],
+    cs_reward: str,
     task: str,
     target: int,
-    cs_reward: str,
     seed: int,
     output: Path,
 ) -> None:
@@ -74,7 +74,7 @@ def score(
     functions: dict[str, RewardFunction] = {"learned": learned, **_controls(learned, truth, seed)}
     rows: list[dict[str, Any]] = []
     points: list[pd.DataFrame] = []
-    sets = dict(_sets(settings, reward, expert, baseline, task, target, seed))
+    sets = dict(_sets(settings, reward, experts[0], baselines[0], task, target, seed))
     for name, chosen in (sets | {"across": _together(list(sets.values()))}).items():
         for function in functions:
             rows += [
