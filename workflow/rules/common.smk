@@ -21,7 +21,7 @@ from mtcsirl.settings.template import as_json
 from mtcsirl.study.ablations import ABLATIONS
 from mtcsirl.study.artefacts import HEAT_MAPS, settle_artefacts
 from mtcsirl.study.design import ARTEFACTS, CLAIMS, design
-from mtcsirl.study.runs import Baseline, Demonstrations, Expert, IrlRun, Score, Transfer
+from mtcsirl.study.runs import FIELDS, Baseline, Demonstrations, Expert, IrlRun, Score, Transfer
 from mtcsirl.study.standing import settle
 
 try:
@@ -53,14 +53,12 @@ pathvars:
 
 
 wildcard_constraints:
-    variant=r"(ablations/\w+/\w+/)?",
+    **FIELDS,
     cs_reward="|".join(SETTINGS.cs_rewards),
     method="|".join({*SETTINGS.methods, "mt_csirl"}),
     experiment="single_target|multi_target|multi_task",
     task="|".join(TASKS),
     source="|".join((*TASKS, "all")),
-    target=r"\d+",
-    seed=r"\d+",
     identity="[0-9a-f]{16}",
 
 

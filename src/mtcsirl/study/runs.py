@@ -104,8 +104,12 @@ def read_folder(pattern: str, folder: str) -> dict[str, str] | None:
     return found.groupdict() if found else None
 
 
+FIELDS = {"variant": r"(?:ablations/\w+/\w+/)?", "target": r"\d+", "seed": r"\d+"}
+"""What a field of a pattern may be, where that is not any name."""
+
+
 def _field(name: str) -> str:
-    return rf"(?P<{name}>{r'(?:ablations/[^/]+/[^/]+/)?' if name == 'variant' else '[^/]+?'})"
+    return rf"(?P<{name}>{FIELDS.get(name, '[^/]+?')})"
 
 
 @dataclass(frozen=True, order=True)

@@ -6,11 +6,11 @@ import torch
 from mtcsirl.episodes.policy import Policy, save_policy
 from mtcsirl.errors import UserError
 from mtcsirl.files import storage
+from mtcsirl.results import scoring
 from mtcsirl.rewards.learned import LearnedReward, save_learned_reward
 from mtcsirl.rewards.networks import RewardNetwork
 from mtcsirl.settings import ScoreSettings
 from mtcsirl.settings.runs import ScoreRunSettings
-from mtcsirl.stages import scoring
 
 SETTINGS = ScoreRunSettings(score=ScoreSettings(transitions=120, bootstrap=20))
 ARCHITECTURE = {
