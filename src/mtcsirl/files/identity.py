@@ -65,24 +65,41 @@ def dumps(record: Record) -> str:
     return json.dumps(said, sort_keys=True, separators=(",", ":"), allow_nan=False) + "\n"
 
 
-def read_record(folder: Path | str) -> Record | None:
-    """The record in ``folder``; None if there is none.
+def parse_record(text: str, where: str) -> Record:
+    """The record that ``dumps`` wrote.
 
     Raises:
         UserError: it is damaged or does not fit its own hash.
     """
-    path = Path(folder) / FILE
     try:
-        said = json.loads(path.read_text(encoding="utf-8"))
+        said = json.loads(text)
         identity = Identity(said["stage"], said["key"], said["settings"], said["code"], said["inputs"])
         record = Record(identity, said["files"], said["read"])
         if said["format"] != FORMAT or said["hash"] != identity.hash:
             raise ValueError("it does not fit its own hash")
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
+        raise UserError(f"{where}: not a readable identity ({error}); delete its folder and make it again") from error
+    return record
+
+
+def read_record(folder: Path | str) -> Record | None:
+    """The record in ``folder``; None if there is none.
+
+    Raises:
+        UserError: it is unreadable.
+    """
+    path = Path(folder) / FILE
+    try:
+        return parse_record(path.read_text(encoding="utf-8"), str(path))
     except FileNotFoundError:
         return None
-    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
+    except (OSError, UnicodeDecodeError) as error:
         raise UserError(f"{path}: not a readable identity ({error}); delete its folder and make it again") from error
-    return record
+
+
+def digest_of(content: bytes) -> str:
+    """SHA-256 of bytes."""
+    return hashlib.sha256(content).hexdigest()
 
 
 def checksum(path: Path) -> str:
