@@ -85,10 +85,12 @@ def collect_demonstrations(
     """
     from mtcsirl.episodes.demonstrations import collect_demonstrations as collect
     from mtcsirl.episodes.demonstrations import demonstrated
-    from mtcsirl.episodes.evaluation import gate_verdict
+    from mtcsirl.episodes.evaluation import check_expert
+    from mtcsirl.episodes.gates import gate_verdict
 
+    check_expert(expert, task, target, cs_reward)
     with _run(settings, output, {"policy": expert / "policy.safetensors"}):
-        frame = collect(load_policy(expert), task, target, settings, seed=0)
+        frame = collect(load_policy(expert), task, target, settings, seed=0, cs_reward=cs_reward)
         storage.write_parquet(output / "demonstrations.parquet", frame)
         storage.write_json(output / "gate.json", gate_verdict("expert", demonstrated(frame), cs_reward, settings.gates))
 

@@ -25,7 +25,7 @@ GLUE = (
 ROOTS: dict[str, tuple[str, ...]] = {
     "train_expert": ("agents/training.py", "rewards/mixture.py", "rewards/ground_truth.py"),
     "train_sac": ("agents/training.py",),
-    "collect_demonstrations": ("episodes/demonstrations.py",),
+    "collect_demonstrations": ("episodes/demonstrations.py", "episodes/gates.py"),
     "learn_reward": ("irl/run.py",),
     "transfer": ("agents/training.py", "rewards/learned.py"),
     "score_reward": ("stages/scoring.py",),
