@@ -7,7 +7,7 @@ from metaworld.policies import ENV_POLICY_MAP
 
 from mtcsirl.episodes.evaluation import (
     COLUMNS,
-    check_expert,
+    check_agent,
     evaluate,
     evaluated,
     measure_episode,
@@ -169,13 +169,13 @@ def test_the_last_policy_has_rows_of_its_own_with_the_same_random_numbers(settin
 def test_a_folder_says_whose_evaluation_it_holds(settings, tmp_path):
     rows = pd.DataFrame(evaluate(constant_policy([0.1] * 4), *KEY, settings), columns=list(COLUMNS))
     assert evaluated(tmp_path) is None
-    check_expert(tmp_path, "reach", 0, "action_norm")  # a policy of one's own says nothing
+    check_agent(tmp_path, "reach", 0, "action_norm")  # a policy of one's own says nothing
     write_csv(tmp_path / "evaluation.csv", rows)
     assert evaluated(tmp_path) == KEY
-    check_expert(tmp_path, *KEY[:3])
+    check_agent(tmp_path, *KEY[:3])
     for other in (("reach", 3, "velocity"), ("drawer-close", 0, "velocity"), ("drawer-close", 3, "action_norm")):
         with pytest.raises(UserError, match="holds an expert of velocity on drawer-close-t3, not"):
-            check_expert(tmp_path, *other)
+            check_agent(tmp_path, *other)
     write_csv(tmp_path / "evaluation.csv", pd.concat([rows, rows.assign(seed=8)]))
     with pytest.raises(UserError, match="holds 2 agents"):
         evaluated(tmp_path)

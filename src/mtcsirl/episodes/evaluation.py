@@ -153,15 +153,18 @@ def evaluated(folder: Path | str) -> Evaluated | None:
     return Evaluated(str(task), int(target), str(cs_reward), int(seed))
 
 
-def check_expert(folder: Path | str, task: str, target: int, cs_reward: str) -> None:
-    """Refuse a policy whose own evaluation, where there is one, says that it is another expert than is asked for.
+def check_agent(folder: Path | str, task: str, target: int, cs_reward: str) -> Evaluated | None:
+    """Whose evaluation a folder holds, refused if another agent's; ``cs_reward`` is "" for plain SAC.
 
     Raises:
-        UserError: it was trained on another task, target or cs-reward.
+        UserError: the agent was trained on another task, target or cs-reward.
     """
     found = evaluated(folder)
     if found is not None and found[:3] != (task, target, cs_reward):
-        kind = f"an expert of {found.cs_reward}" if found.cs_reward else "an agent without a cs-reward"
-        raise UserError(
-            f"{folder}: holds {kind} on {found.task}-t{found.target}, not an expert of {cs_reward} on {task}-t{target}"
-        )
+        wanted = f"{_kind(cs_reward)} on {task}-t{target}"
+        raise UserError(f"{folder}: holds {_kind(found.cs_reward)} on {found.task}-t{found.target}, not {wanted}")
+    return found
+
+
+def _kind(cs_reward: str) -> str:
+    return f"an expert of {cs_reward}" if cs_reward else "an agent without a cs-reward"

@@ -85,10 +85,10 @@ def collect_demonstrations(
     """
     from mtcsirl.episodes.demonstrations import collect_demonstrations as collect
     from mtcsirl.episodes.demonstrations import demonstrated
-    from mtcsirl.episodes.evaluation import check_expert
+    from mtcsirl.episodes.evaluation import check_agent
     from mtcsirl.episodes.gates import gate_verdict
 
-    check_expert(expert, task, target, cs_reward)
+    check_agent(expert, task, target, cs_reward)
     with _run(settings, output, {"policy": expert / "policy.safetensors"}):
         frame = collect(load_policy(expert), task, target, settings, seed=0, cs_reward=cs_reward)
         storage.write_parquet(output / "demonstrations.parquet", frame)
@@ -114,8 +114,8 @@ def learn_reward(
 def score_reward(
     settings: ScoreRunSettings,
     reward: Path,
-    expert: Path,
-    baseline: Path,
+    experts: Sequence[Path],
+    baselines: Sequence[Path],
     task: str,
     target: int,
     cs_reward: str,
@@ -125,8 +125,11 @@ def score_reward(
     """Hold the learned reward in the folder ``reward`` against the truth on named transition sets."""
     from mtcsirl.stages.scoring import score  # scipy.stats, which the other stages start without
 
-    with _run(settings, output, {"reward": reward / WEIGHTS}):
-        score(settings, reward, expert, baseline, task, target, cs_reward, seed, output)
+    inputs = {"reward": reward / WEIGHTS, "samples": reward / "samples.parquet"}
+    for name, folders in (("expert", experts), ("baseline", baselines)):
+        inputs |= {f"{name}_{index}": folder / "policy.safetensors" for index, folder in enumerate(folders)}
+    with _run(settings, output, inputs):
+        score(settings, reward, experts, baselines, task, target, cs_reward, seed, output)
 
 
 @contextmanager
