@@ -89,8 +89,15 @@ def write_csv(path: Path | str, frame: "pd.DataFrame") -> None:
         frame.to_csv(handle, index=False, float_format="%.9g", lineterminator="\n")
 
 
+_NUMBERS = {"target", "seed", "episode", "step", "value", "low", "high", "n", "episodes"}
+"""Columns of tidy frames that hold numbers."""
+
+
 def read_csv(path: Path | str, columns: tuple[str, ...] = ()) -> "pd.DataFrame":
-    """Read a tidy frame and check that ``columns`` are there; empty cells of text columns stay empty strings."""
+    """Read a tidy frame and check that ``columns`` are there; empty cells of text columns stay empty strings.
+
+    A text in a column of numbers is an error that names both; an empty cell there is NaN.
+    """
     import pandas as pd
 
     names = ("task", "cs_reward", "method", "source", "experiment", "policy", "metric", "discriminator")
@@ -99,8 +106,13 @@ def read_csv(path: Path | str, columns: tuple[str, ...] = ()) -> "pd.DataFrame":
     def parse(p: Path) -> "pd.DataFrame":
         return pd.read_csv(p, dtype=text, keep_default_na=True).fillna(dict.fromkeys(text, ""))
 
-    frame = _read(path, parse, "CSV file")
-    return _with_columns(path, frame, columns)
+    frame = _with_columns(path, _read(path, parse, "CSV file"), columns)
+    for name in _NUMBERS & set(frame.columns):
+        if not pd.api.types.is_numeric_dtype(frame[name]):
+            texts = frame[name][pd.to_numeric(frame[name], errors="coerce").isna() & frame[name].notna()]
+            if len(texts):
+                raise UserError(f"{path}: column {name} holds {str(texts.iloc[0])[:40]!r}, not a number; make it again")
+    return frame
 
 
 def write_parquet(path: Path | str, frame: "pd.DataFrame") -> None:
