@@ -110,12 +110,15 @@ def point_rows(study: Study, results: Path | str, *, partial: bool = False) -> p
 
 
 def _of_scores(study: Study, results: Path | str, name: str, columns: tuple[str, ...], partial: bool) -> pd.DataFrame:
+    read = storage.read_parquet if name.endswith("parquet") else storage.read_csv
+    own = (*RUN_KEY, "task")
     frames = []
     for run in study.scores:
         path = Path(results) / run.folder / name
         if _present(path, partial):
-            frame = storage.read_parquet(path) if name.endswith("parquet") else storage.read_csv(path)
-            frames.append(frame.assign(**{key: getattr(run.irl, key) for key in RUN_KEY}, task=run.task))
+            key = {part: getattr(run.irl, part) for part in RUN_KEY} | {"task": run.task}
+            frame = read(path, tuple(column for column in columns if column not in own))
+            frames.append(frame.assign(**key))
     return _joined(frames, columns)
 
 
