@@ -59,3 +59,14 @@ TASKS: tuple[str, ...] = (
 
 TARGETS_PER_TASK = 50
 """Meta-World draws 50 targets (variations) per task; a target is an index into them."""
+
+KEPT, LAST = "kept", "last"
+"""Which policy of a training a row of an evaluation is about: the one that the run leaves behind, or the last."""
+
+DIVERGED = "diverged"
+"""The metric that is 1 in an episode whose simulation diverged, else 0."""
+
+
+def distance_metric(cs_reward: str) -> str:
+    """The metric E|m - target| of a cs-reward's measure m: minus its mean unweighted ground-truth reward."""
+    return f"{cs_reward}_distance"

@@ -206,7 +206,9 @@ def test_a_run_warms_up_as_long_as_its_slowest_task_asks() -> None:
     assert irl_run(study, "multi_task", ["reach"]) != irl_run(study, "multi_task", ["plate-slide"])
 
 
-@pytest.mark.parametrize("module", ["settings.loading", "study.design", "study.plan", "study.status", "study.artefacts", "cli"])
+@pytest.mark.parametrize(
+    "module", ["settings.loading", "study.design", "study.plan", "study.status", "study.artefacts", "cli"]
+)
 def test_settings_and_study_import_neither_torch_nor_snakemake(module: str) -> None:
     """Snakemake reads them once per job, a shell at every --help."""
     code = (

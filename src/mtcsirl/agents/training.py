@@ -20,7 +20,8 @@ from mtcsirl.agents.learners import make_learner
 from mtcsirl.agents.progress import Progress
 from mtcsirl.agents.replay import Replay
 from mtcsirl.agents.scripted import ScriptedExplorers
-from mtcsirl.episodes.evaluation import gate_verdict, measure_episode, stochastic_means
+from mtcsirl.episodes.evaluation import measure_episode
+from mtcsirl.episodes.gates import gate_verdict, stochastic_means
 from mtcsirl.episodes.lockstep import TaskEnvironments, make_environments
 from mtcsirl.episodes.policy import Policy
 from mtcsirl.files import storage

@@ -82,7 +82,9 @@ def _table(parsed: argparse.Namespace) -> None:
 
     settings = study_settings(parsed)
     name = f"table_{parsed.number}"
-    rows = evaluation_rows(design(settings, name), settings.results, partial=parsed.partial)
+    rows = evaluation_rows(
+        design(settings, name), settings.results, episodes=settings.evaluation.episodes, partial=parsed.partial
+    )
     table = TABLES[name](rows, settings)
     home = Path(settings.results) / "tables"
     folder = parsed.output or home
@@ -176,7 +178,10 @@ def _ablation(parsed: argparse.Namespace) -> None:
 
     settings, name = study_settings(parsed), parsed.name
     shown = variants(settings, name)
-    frames = {v: evaluation_rows(study, settings.results, partial=parsed.partial) for v, study in shown.items()}
+    frames = {
+        v: evaluation_rows(study, settings.results, episodes=settings.evaluation.episodes, partial=parsed.partial)
+        for v, study in shown.items()
+    }
     rows = variant_rows(frames)
     home, figures = Path(settings.results) / "ablations", parsed.figures or Path(settings.figures)
     write_csv((parsed.output or home) / f"{name}.csv", rows)
@@ -211,8 +216,10 @@ def _judged(settings: Settings, partial: bool) -> "list[Finding]":
     from mtcsirl.study.design import variants
 
     study, name = design(settings), "ablation_curriculum"
-    rows = evaluation_rows(study, settings.results, partial=partial)
-    without = ablated_generators(variants(settings, name)["constant"], settings.results, name)
+    rows = evaluation_rows(study, settings.results, episodes=settings.evaluation.episodes, partial=partial)
+    without = ablated_generators(
+        variants(settings, name)["constant"], settings.results, name, episodes=settings.evaluation.episodes
+    )
     scores = score_rows(study, settings.results, partial=partial)
     return judge(pd.concat([rows, without], ignore_index=True), scores, settings)
 
@@ -225,7 +232,12 @@ def _results(parsed: argparse.Namespace) -> None:
     from mtcsirl.tables import TABLES
 
     settings = study_settings(parsed)
-    rows = {name: evaluation_rows(design(settings, name), settings.results, partial=parsed.partial) for name in TABLES}
+    rows = {
+        name: evaluation_rows(
+            design(settings, name), settings.results, episodes=settings.evaluation.episodes, partial=parsed.partial
+        )
+        for name in TABLES
+    }
     tables = {name: table(rows[name], settings) for name, table in TABLES.items()}
     made = {"commit": commit(), **machine()}
     page = (parsed.output or Path("docs")) / "results.md"

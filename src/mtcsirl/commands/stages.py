@@ -178,14 +178,13 @@ def _score_reward(verbs: Verbs) -> None:
         "score-reward",
         run,
         does="correlate a learned reward with the ground truth on named transition sets, beside controls",
-        needs="the folders of a learned reward, of an expert and of a SAC baseline of the task",
+        needs="the folders of a learned reward, of experts and of SAC baselines of the task",
         writes="scores.csv, points.parquet, settings.json, provenance.json into --output",
     )
     verb.add_argument("--reward", required=True, type=_folder, metavar="DIR", help="folder of the learned reward")
     for name, what in (("expert", "experts"), ("baseline", "SAC baselines")):
-        verb.add_argument(
-            f"--{name}", required=True, nargs="+", type=_folder, metavar="DIR", help=f"folders of {what}, one per seed"
-        )
+        does = f"folders of the {what} of the task, one per seed"
+        verb.add_argument(f"--{name}", required=True, nargs="+", type=_folder, metavar="DIR", help=does)
     add_agent(verb)
     add_run_settings(verb)
     add_output(verb)

@@ -7,9 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from mtcsirl.episodes.demonstrations import COLUMNS
+from mtcsirl.episodes.demonstrations import read_demonstrations
 from mtcsirl.errors import UserError
-from mtcsirl.files.storage import read_parquet
 from mtcsirl.worlds.environments import ACTION_SIZE, OBSERVATION_SIZE
 
 
@@ -28,7 +27,7 @@ def export_minari(demonstrations: Path | str, folder: Path | str, name: str | No
         from minari.data_collector import EpisodeBuffer
     except ImportError as error:
         raise UserError("Minari is not installed: pip install 'mtcsirl[export]'") from error
-    frame = read_parquet(demonstrations, COLUMNS)
+    frame = read_demonstrations(demonstrations)
     task, target = frame["task"].iloc[0], int(frame["target"].iloc[0])
     name = name or f"mtcsirl/{task}-t{target}-v0"
     if name in minari.list_local_datasets():

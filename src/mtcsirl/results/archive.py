@@ -3,8 +3,8 @@
 A part is a folder ``part-0001`` of Parquet files and a manifest with their SHA-256; no part is ever written again. Tidy
 frames (``evaluation``, ``curve``, ``scores``, ``points``, ``diagnostics``) are to be read in pandas, with the run's
 folder in the first column; ``texts`` holds identities, provenance, settings, gates and descriptions as they are, and
-``weights`` the learned rewards and the policies that others were made from. Out of these every kept file comes back byte
-for byte, as the checksums in its run's identity say; what is not kept is named there all the same.
+``weights`` the learned rewards and the policies that others were made from. Out of these every kept file comes back
+byte for byte, as the checksums in its run's identity say; what is not kept is named there all the same.
 """
 
 from __future__ import annotations
@@ -163,7 +163,7 @@ def kept_files(folder: str, frames: Mapping[str, pd.DataFrame]) -> dict[str, byt
         return pd.DataFrame() if frame is None else frame[frame["folder"] == folder].drop(columns="folder")
 
     files = {str(row.name): str(row.content).encode() for row in own("texts").itertuples(index=False, name="Row")}
-    files |= {str(row.name): _unshuffled(row.content) for row in own("weights").itertuples(index=False, name="Row")}
+    files |= {str(row.name): _unshuffled(bytes(row.content)) for row in own("weights").itertuples(name="Row")}  # type: ignore[arg-type]
     for file, name in CSVS.items():
         frame = own(name)
         if len(frame):

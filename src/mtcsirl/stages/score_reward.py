@@ -39,7 +39,9 @@ def score_reward(
     inputs |= _policies("expert", experts) | _policies("baseline", baselines)
     made_from = identity(STAGE, scoring._asdict(), settings, {role: one.hash for role, one in inputs.items()})
     read = {role: one.bytes for role, one in inputs.items()}
-    files = {"reward": reward / WEIGHTS}
+    files = {"reward": reward / WEIGHTS, "samples": reward / "samples.parquet"}
+    for role, folders in (("expert", experts), ("baseline", baselines)):
+        files |= {f"{role}_{index}": folder / "policy.safetensors" for index, folder in enumerate(folders)}
     with running(Task(made_from, settings, output, read, files, wanted)) as needed:
         if needed:
             score(settings, reward, experts, baselines, *scoring, output)

@@ -7,9 +7,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 from mtcsirl.agents.jobs import AgentJob
-from mtcsirl.errors import UserError
 from mtcsirl.files import storage
-from mtcsirl.rewards.learned import DESCRIPTION, WEIGHTS, load_learned_reward
+from mtcsirl.rewards.learned import DESCRIPTION, WEIGHTS, check_learned, load_learned_reward
 from mtcsirl.settings.runs import AgentRunSettings
 from mtcsirl.stages.agents import agent_task, train
 from mtcsirl.stages.running import Input, look_at
@@ -38,10 +37,7 @@ def transfer_job(settings: AgentRunSettings, reward: Path, agent: NewAgent) -> A
         UserError: the reward was learned from experts of another cs-reward or on another observation.
     """
     learned = load_learned_reward(reward)
-    if learned.cs_reward != agent.cs_reward:
-        raise UserError(f"{reward}: learned from {learned.cs_reward} experts, not {agent.cs_reward}; ask for its own")
-    if learned.observation != settings.environment.observation:
-        raise UserError(f"{reward}: learned on {learned.observation!r} observations; set environment.observation so")
+    check_learned(learned, reward, cs_reward=agent.cs_reward, observation=settings.environment.observation)
     own = learned.task_reward(agent.task, agent.target) if agent.task_reward == "learned" else None
     return AgentJob(
         agent.task,
