@@ -33,7 +33,7 @@ class DiscriminatorSettings(Frozen):
 
 
 class IrlAlgorithmSettings(Frozen):
-    """Algorithms 1 and 2; how long generators warm up is a matter of their tasks."""
+    """Algorithms 1 and 2 but for what depends on tasks (the warm-up) or on the experiment (updates)."""
 
     iterations: int = key(120, "N: outer iterations after the warm-up", unit="iterations", gt=0)
     steps_per_iteration: int = key(
@@ -43,8 +43,6 @@ class IrlAlgorithmSettings(Frozen):
         paper=500,
         gt=0,
     )
-    discriminator_updates: int = key(40, "D_updates per task and iteration", unit="updates", paper=15, gt=0)
-    generator_updates: int = key(250, "G_updates per task and iteration", unit="updates", paper=15, gt=0)
     generator_replay: int = key(
         20,
         "generator samples come from the last this many iterations; 1 = latest rollout",
@@ -128,6 +126,8 @@ class IrlAlgorithmSettings(Frozen):
 class IrlSettings(IrlAlgorithmSettings):
     """Algorithms 1 and 2 as one run has them."""
 
+    discriminator_updates: int = Field(default=40, gt=0, description="gradient steps per task and iteration")
+    generator_updates: int = Field(default=250, gt=0, description="gradient steps per task and iteration")
     warm_up_iterations: int = Field(default=0, ge=0, description="that of the run's slowest task")
 
 
