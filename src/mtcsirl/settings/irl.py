@@ -5,6 +5,7 @@ from typing import Literal
 from pydantic import Field
 
 from mtcsirl.settings.base import Frozen, key
+from mtcsirl.settings.budgets import EXPERIMENTS, Updates
 from mtcsirl.settings.learner import RewardScaleSettings, Temperature
 
 
@@ -121,6 +122,31 @@ class IrlAlgorithmSettings(Frozen):
             initial_temperature=scale * self.initial_temperature,
             reward_scale=scale,
         )
+
+
+class IrlUpdateSettings(IrlAlgorithmSettings):
+    """Algorithms 1 and 2 with the updates of each experiment, as the configuration has them."""
+
+    discriminator_updates: Updates = key(
+        lambda: dict.fromkeys(EXPERIMENTS, 40),
+        "D_updates per task and iteration, by experiment",
+        unit="updates",
+        paper={"single_target": 15, "multi_target": 15, "multi_task": 10},
+    )
+    generator_updates: Updates = key(
+        lambda: dict.fromkeys(EXPERIMENTS, 250),
+        "G_updates per task and iteration, by experiment",
+        unit="updates",
+        paper={"single_target": 15, "multi_target": 15, "multi_task": 20},
+    )
+    discriminator_update: Literal["gradient_step", "epoch"] = key(
+        "gradient_step", "one of D_updates: one gradient step, or as many as an epoch has steps (steps_per_iteration)"
+    )
+    generator_update: Literal["gradient_step", "epoch"] = key(
+        "gradient_step",
+        "one of G_updates: one gradient step; or an epoch as SAC has them: steps_per_iteration environment steps and as"
+        " many gradient steps, so that an iteration collects G_updates times as much",
+    )
 
 
 class IrlSettings(IrlAlgorithmSettings):

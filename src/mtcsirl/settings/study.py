@@ -10,8 +10,8 @@ from mtcsirl.irl.methods import METHODS as METHOD_REGISTRY
 from mtcsirl.names import TARGETS_PER_TASK
 from mtcsirl.rewards.ground_truth import COMMON_SENSE_REWARDS
 from mtcsirl.settings.base import Frozen, key
-from mtcsirl.settings.budgets import EXPERIMENTS, Budget, Iterations, Shares, Task, Updates
-from mtcsirl.settings.irl import IrlAlgorithmSettings, ScoreSettings, TransferSettings
+from mtcsirl.settings.budgets import Budget, Iterations, Shares, Task
+from mtcsirl.settings.irl import IrlUpdateSettings, ScoreSettings, TransferSettings
 from mtcsirl.settings.learner import (
     EnvironmentSettings,
     EvaluationSettings,
@@ -201,29 +201,9 @@ class DemonstrationSettings(Frozen):
     )
 
 
-class IrlStudySettings(IrlAlgorithmSettings):
+class IrlStudySettings(IrlUpdateSettings):
     """Inverse reinforcement learning."""
 
-    discriminator_updates: Updates = key(
-        lambda: dict.fromkeys(EXPERIMENTS, 40),
-        "D_updates per task and iteration, by experiment",
-        unit="updates",
-        paper={"single_target": 15, "multi_target": 15, "multi_task": 10},
-    )
-    generator_updates: Updates = key(
-        lambda: dict.fromkeys(EXPERIMENTS, 250),
-        "G_updates per task and iteration, by experiment",
-        unit="updates",
-        paper={"single_target": 15, "multi_target": 15, "multi_task": 20},
-    )
-    discriminator_update: Literal["gradient_step", "epoch"] = key(
-        "gradient_step", "one of D_updates: one gradient step, or as many as an epoch has steps (steps_per_iteration)"
-    )
-    generator_update: Literal["gradient_step", "epoch"] = key(
-        "gradient_step",
-        "one of G_updates: one gradient step; or an epoch as SAC has them: steps_per_iteration environment steps and as"
-        " many gradient steps, so that an iteration collects G_updates times as much",
-    )
     warm_up_iterations: Iterations = key(
         lambda: dict(WARM_UP_ITERATIONS),
         "iterations on the task reward alone before IRL, as many as the slowest task of a run asks for; methods that"
