@@ -30,7 +30,7 @@ smoke: setup  ## the same in minutes, too small to mean anything
 quick: setup  ## what one runs before each commit, under two minutes on two idle cores: lint, fast tests
 	ruff check
 	ruff format --check
-	pytest -n $(CORES) --dist loadfile -m "not slow and not dag"
+	pytest -n $(CORES) --dist loadfile -m "not slow and not dag" --ignore tests/dag
 
 test: setup  ## all tests, with coverage; the smoke DAG comes last, as it uses the cores itself
 	pytest -n $(CORES) --dist loadfile -m "not dag" --cov
