@@ -2,7 +2,7 @@
 
 ``study/calibration.json`` holds the rates of one machine; ``mtcsirl calibrate`` measures another one. The model is the
 sum of what a job does: start-up, environment steps, gradient steps, trial and final episodes. A test holds its parts
-against each other; the README says how far it was from a real run.
+against each other; the start page of a finished study gives the cost as measured.
 """
 
 from collections.abc import Iterable
