@@ -11,7 +11,7 @@ import yaml
 from pydantic import ValidationError
 
 from mtcsirl.errors import UserError
-from mtcsirl.irl.methods import METHODS
+from mtcsirl.extensions import METHODS
 from mtcsirl.rewards.ground_truth import COMMON_SENSE_REWARDS
 from mtcsirl.settings import Settings, granted
 from mtcsirl.settings.loading import load, merge, override, read_yaml, validate
@@ -206,7 +206,7 @@ def test_a_run_warms_up_as_long_as_its_slowest_task_asks() -> None:
     assert irl_run(study, "multi_task", ["reach"]) != irl_run(study, "multi_task", ["plate-slide"])
 
 
-@pytest.mark.parametrize("module", ["settings.loading", "design", "plan", "status", "cli"])
+@pytest.mark.parametrize("module", ["settings.loading", "study.design", "study.plan", "study.status", "cli"])
 def test_settings_and_study_import_neither_torch_nor_snakemake(module: str) -> None:
     """Snakemake reads them once per job, a shell at every --help."""
     code = (

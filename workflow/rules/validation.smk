@@ -4,7 +4,7 @@
 rule validation:
     """MT-CSIRL and its controls where the truth is known."""
     input:
-        code=code("validation/study.py", "validation/figure.py", "irl/methods/mt_csirl.py"),
+        code=code("validation/recovery.py", "validation/figure.py", "irl/methods/mt_csirl.py"),
     output:
         correlations="<results>/validation/correlations.csv",
         agents="<results>/validation/agents.csv",

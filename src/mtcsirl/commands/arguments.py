@@ -136,7 +136,7 @@ def cs_reward(name: str) -> str:
 
 def method(name: str) -> str:
     """A registered IRL method."""
-    from mtcsirl.irl.methods import METHODS
+    from mtcsirl.extensions import METHODS
 
     return _registered(name, METHODS, "method")
 

@@ -25,9 +25,9 @@ def register(verbs: Verbs) -> None:
 def _validate(parsed: argparse.Namespace) -> None:
     from mtcsirl.files.storage import write_csv
     from mtcsirl.validation.figure import caption, draw
-    from mtcsirl.validation.study import ValidationSettings, validate
+    from mtcsirl.validation.recovery import ValidationSettings, recover
 
-    findings = validate(ValidationSettings(), processes=parsed.processes)
+    findings = recover(ValidationSettings(), processes=parsed.processes)
     for name, frame in findings._asdict().items():
         write_csv(parsed.output / f"{name}.csv", frame)
     figure, text = draw(findings), caption(findings)

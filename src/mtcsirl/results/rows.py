@@ -13,7 +13,7 @@ import pandas as pd
 
 from mtcsirl.errors import UserError
 from mtcsirl.files import storage
-from mtcsirl.settings.study import CS_REWARDS
+from mtcsirl.names import CS_REWARDS
 from mtcsirl.study.runs import Baseline, Demonstrations, Expert, IrlRun, Run, Study, Transfer
 
 KEY = ("stage", "experiment", "method", "cs_reward", "source", "task", "target", "seed")

@@ -5,6 +5,16 @@ are small overlays.
 """
 
 from mtcsirl.settings.budgets import granted
+from mtcsirl.settings.configuration import (
+    BaselineSettings,
+    DemonstrationSettings,
+    ExpertSettings,
+    MultiTargetSettings,
+    MultiTaskSettings,
+    Settings,
+    SingleTargetSettings,
+    TransferStudySettings,
+)
 from mtcsirl.settings.irl import DiscriminatorSettings, IrlSettings, ScoreSettings, TransferSettings
 from mtcsirl.settings.learner import (
     EnvironmentSettings,
@@ -14,16 +24,6 @@ from mtcsirl.settings.learner import (
     ProgressSettings,
     RewardScaleSettings,
     SacSettings,
-)
-from mtcsirl.settings.study import (
-    BaselineSettings,
-    DemonstrationSettings,
-    ExpertSettings,
-    MultiTargetSettings,
-    MultiTaskSettings,
-    Settings,
-    SingleTargetSettings,
-    TransferStudySettings,
 )
 
 __all__ = [

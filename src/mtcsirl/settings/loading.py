@@ -10,7 +10,7 @@ from pydantic import BaseModel, ValidationError
 
 from mtcsirl.errors import UserError
 from mtcsirl.files.storage import read_text
-from mtcsirl.settings.study import Settings
+from mtcsirl.settings.configuration import Settings
 
 Model = TypeVar("Model", bound=BaseModel)
 CONFIG_FOLDERS = (Path("config"), Path(__file__).resolve().parents[3] / "config")

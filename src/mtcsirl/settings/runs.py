@@ -10,6 +10,7 @@ from pydantic import Field
 
 from mtcsirl.settings.base import Frozen
 from mtcsirl.settings.budgets import granted
+from mtcsirl.settings.configuration import Settings
 from mtcsirl.settings.irl import IrlAlgorithmSettings, IrlSettings, ScoreSettings
 from mtcsirl.settings.learner import (
     EnvironmentSettings,
@@ -18,7 +19,6 @@ from mtcsirl.settings.learner import (
     ProgressSettings,
     SacSettings,
 )
-from mtcsirl.settings.study import Settings
 
 
 class AgentRunSettings(Frozen):

@@ -10,7 +10,7 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
 from mtcsirl.settings.base import NOT_GIVEN
-from mtcsirl.settings.study import Settings
+from mtcsirl.settings.configuration import Settings
 
 WIDTH = 120
 HEAD = """\

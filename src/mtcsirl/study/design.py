@@ -4,10 +4,10 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 
 from mtcsirl.errors import UserError
+from mtcsirl.names import EVALUATION_TARGET
 from mtcsirl.settings import Settings
 from mtcsirl.study.ablations import ABLATIONS
 from mtcsirl.study.runs import (
-    EVALUATION_TARGET,
     Baseline,
     Demonstrations,
     Expert,

@@ -21,9 +21,6 @@ from mtcsirl.settings.runs import (
 )
 from mtcsirl.study.ablations import changes, prefix
 
-EVALUATION_TARGET = 0
-"""Every result is read on target 0; the IRL of several targets or tasks trains on others, so it is new to it."""
-
 
 def varied(settings: Settings, variant: str) -> Settings:
     """``settings`` with the changes of a variant, as in ``ablation_replay/latest``; the main study has none."""

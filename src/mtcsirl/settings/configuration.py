@@ -5,9 +5,9 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, Field, model_validator
 
+from mtcsirl.extensions import METHODS as METHOD_REGISTRY
 from mtcsirl.extensions import load_extensions
-from mtcsirl.irl.methods import METHODS as METHOD_REGISTRY
-from mtcsirl.names import TARGETS_PER_TASK
+from mtcsirl.names import CS_REWARDS, METHODS, SINGLE_TASKS, TARGETS_PER_TASK, TRAIN_TASKS, UNSEEN_TASKS
 from mtcsirl.rewards.ground_truth import COMMON_SENSE_REWARDS
 from mtcsirl.settings.base import Frozen, key
 from mtcsirl.settings.budgets import Budget, Iterations, Shares, Task
@@ -20,14 +20,6 @@ from mtcsirl.settings.learner import (
     ProgressSettings,
     RewardScaleSettings,
 )
-
-SINGLE_TASKS = ("reach-wall", "button-press-topdown-wall", "drawer-close", "push-back", "coffee-button")
-TRAIN_TASKS = ("window-open", "reach", "plate-slide", "faucet-open", "coffee-button", "door-close")
-DESIGN_TASKS = tuple(dict.fromkeys(SINGLE_TASKS + TRAIN_TASKS))
-"""The ten tasks of the paper."""
-UNSEEN_TASKS = ("reach-wall", "button-press-topdown-wall", "drawer-close", "push-back")
-METHODS = ("mt_airl", "mt_vairl", "mt_vairl_gp", "mt_csirl", "mt_csirl_lt")
-CS_REWARDS = ("velocity", "action_norm")
 
 
 def _known_method(name: str) -> str:

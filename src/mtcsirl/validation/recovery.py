@@ -100,7 +100,7 @@ class Findings(NamedTuple):
     """reward, seed, task, target, step, metric, value of the generators and discriminators."""
 
 
-def validate(settings: ValidationSettings, processes: int = 1) -> Findings:
+def recover(settings: ValidationSettings, processes: int = 1) -> Findings:
     """Run the study: per seed MT-CSIRL on four goals and on one, controls, and new agents on the unseen goal."""
     if processes <= 1:
         parts = [_one_seed(settings, seed) for seed in settings.seeds]
