@@ -15,7 +15,7 @@ from mtcsirl.settings.configuration import (
     SingleTargetSettings,
     TransferStudySettings,
 )
-from mtcsirl.settings.irl import DiscriminatorSettings, IrlSettings, ScoreSettings, TransferSettings
+from mtcsirl.settings.irl import DiscriminatorSettings, GeneratorSettings, IrlSettings, ScoreSettings, TransferSettings
 from mtcsirl.settings.learner import (
     EnvironmentSettings,
     EvaluationSettings,
@@ -34,6 +34,7 @@ __all__ = [
     "EvaluationSettings",
     "ExpertSettings",
     "GateSettings",
+    "GeneratorSettings",
     "IrlSettings",
     "LearnerSettings",
     "MultiTargetSettings",

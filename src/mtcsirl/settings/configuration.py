@@ -11,7 +11,7 @@ from mtcsirl.names import CS_REWARDS, METHODS, SINGLE_TASKS, TARGETS_PER_TASK, T
 from mtcsirl.rewards.ground_truth import COMMON_SENSE_REWARDS
 from mtcsirl.settings.base import Frozen, key
 from mtcsirl.settings.budgets import Budget, Iterations, Shares, Task
-from mtcsirl.settings.irl import IrlAlgorithmSettings, ScoreSettings, TransferSettings
+from mtcsirl.settings.irl import GeneratorSettings, IrlAlgorithmSettings, ScoreSettings, TransferSettings
 from mtcsirl.settings.learner import (
     EnvironmentSettings,
     EvaluationSettings,
@@ -193,7 +193,7 @@ class DemonstrationSettings(Frozen):
     )
 
 
-class IrlStudySettings(IrlAlgorithmSettings):
+class IrlStudySettings(IrlAlgorithmSettings, GeneratorSettings):
     """Inverse reinforcement learning."""
 
     warm_up_iterations: Iterations = key(

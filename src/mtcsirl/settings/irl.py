@@ -99,6 +99,17 @@ class IrlAlgorithmSettings(Frozen):
         " no preference changes, the critics' targets move less",
         paper=False,
     )
+    warm_up_temperature: Literal["automatic", "as_in_irl"] = key(
+        "automatic",
+        "generators in their warm-up: automatic, as plain SAC, or that of IRL; at temperature 1 the entropy bonus hides"
+        " task rewards below 1, and a task that pays late is not found",
+    )
+    discriminator: DiscriminatorSettings = key(DiscriminatorSettings, "the learned reward")
+
+
+class GeneratorSettings(Frozen):
+    """The generators' temperature and scale in a study; a run has what ``scaling`` makes of them, in ``sac``."""
+
     temperature: Temperature = key(1.0, "generators: automatic or fixed entropy temperature", paper="automatic")
     initial_temperature: float = key(0.05, "generators: start of the automatic temperature", gt=0)
     reward_scale: float = key(
@@ -108,12 +119,6 @@ class IrlAlgorithmSettings(Frozen):
         paper=1.0,
         gt=0,
     )
-    warm_up_temperature: Literal["automatic", "as_in_irl"] = key(
-        "automatic",
-        "generators in their warm-up: automatic, as plain SAC, or that of IRL; at temperature 1 the entropy bonus hides"
-        " task rewards below 1, and a task that pays late is not found",
-    )
-    discriminator: DiscriminatorSettings = key(DiscriminatorSettings, "the learned reward")
 
     def scaling(self) -> RewardScaleSettings:
         """Temperature and scale of the generators' SAC: scaled together, they leave the optimal policy as it is."""
