@@ -46,6 +46,8 @@ def load_extensions(files: Iterable[str | Path]) -> None:
         UserError: a file is missing or fails.
     """
     for file in files:
+        if os.pathsep in str(file):
+            raise UserError(f"extensions: {file}: must not hold {os.pathsep!r}, which separates files in {VARIABLE}")
         path = Path(file).resolve()
         module_name = f"mtcsirl_extension_{path.stem}"
         known = sys.modules.get(module_name)

@@ -61,6 +61,10 @@ TASKS: tuple[str, ...] = (
 
 TARGETS_PER_TASK = 50
 """Meta-World draws 50 targets (variations) per task; a target is an index into them."""
+HIGHEST_TARGET_SEED = 2**32 - 1
+"""Meta-World draws the targets with NumPy's old generator, whose seeds have 32 bits."""
+HIGHEST_SEED = 2**53 - 1
+"""Beyond it a column of numbers in a CSV file cannot tell two seeds apart."""
 EVALUATION_TARGET = 0
 """Every result is read on target 0; the IRL of several targets trains on others, so it is new to it."""
 

@@ -11,14 +11,18 @@ from mtcsirl.study.design import ARTEFACTS, design
 from mtcsirl.errors import UserError
 from mtcsirl.extensions import VARIABLE
 from mtcsirl.study.outputs import OUTPUTS
-from mtcsirl.settings import Settings
-from mtcsirl.settings.loading import validate
+from mtcsirl.settings.loading import configured, read_yaml
+from mtcsirl.settings.machine import check_study
 from mtcsirl.settings.template import as_json
 from mtcsirl.study.sources import sources
 from mtcsirl.names import TASKS
 
 try:
-    SETTINGS = validate(Settings, config)
+    for file in workflow.configfiles if workflow.is_main_process else ():
+        read_yaml(file)  # Snakemake has read them too, but takes what is ambiguous without a word
+    SETTINGS = configured(config)
+    if workflow.is_main_process and workflow.resource_settings.nodes is None:
+        check_study(SETTINGS)  # jobs run here and not on the nodes of a cluster
 except UserError as error:
     sys.exit(str(error))
 

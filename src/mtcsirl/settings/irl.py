@@ -5,13 +5,13 @@ from typing import Literal
 from pydantic import Field
 
 from mtcsirl.settings.base import Frozen, key
-from mtcsirl.settings.learner import RewardScaleSettings, Temperature
+from mtcsirl.settings.learner import RewardScaleSettings, Sizes, Temperature
 
 
 class DiscriminatorSettings(Frozen):
     """The learned reward f and how it is trained."""
 
-    hidden_sizes: tuple[int, ...] = key((128, 128), "hidden layers of f", unit="units", min_length=1)
+    hidden_sizes: Sizes = key((128, 128), "hidden layers of f", unit="units")
     learning_rate: float = key(1.0e-4, "Adam step size of f", gt=0)
     minibatch: int = key(256, "expert and again generator transitions per task and update", unit="transitions", gt=0)
     output_scale: float = key(10.0, "f = output_scale x network", gt=0)
@@ -20,9 +20,7 @@ class DiscriminatorSettings(Frozen):
     )
     log_pi_clamp: float = key(10.0, "log pi is clamped to +- this in the logit", unit="nats", gt=0)
     shaping: bool = key(False, "add gamma h(s') - h(s) to the logit and leave it out of the learned reward")
-    bottleneck_hidden_sizes: tuple[int, ...] = key(
-        (32, 32), "VAIRL: hidden layers of the encoder", unit="units", min_length=1
-    )
+    bottleneck_hidden_sizes: Sizes = key((32, 32), "VAIRL: hidden layers of the encoder", unit="units")
     bottleneck_size: int = key(32, "VAIRL: size of z", unit="units", gt=0)
     information_constraint: float = key(0.5, "VAIRL: I_c on the summed KL", unit="nats", gt=0)
     initial_beta: float = key(0.005, "VAIRL: start of the multiplier beta", ge=0)

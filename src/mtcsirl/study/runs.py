@@ -114,7 +114,7 @@ class IrlRun:
     def settings(self, settings: Settings) -> BaseModel:
         """The slice of ``settings`` that the run depends on."""
         tasks = {task for task, _ in self.members}
-        return irl_run(varied(settings, self.variant), self.experiment, tasks)
+        return irl_run(varied(settings, self.variant), self.experiment, tasks, self.method)
 
 
 @dataclass(frozen=True, order=True)
