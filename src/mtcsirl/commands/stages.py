@@ -1,6 +1,7 @@
 """The verbs that train, learn and measure: one per stage of the DAG, and ``evaluate``."""
 
 import argparse
+from functools import partial
 from pathlib import Path
 
 from mtcsirl.commands.arguments import (
@@ -11,11 +12,15 @@ from mtcsirl.commands.arguments import (
     add_run_settings,
     add_task,
     add_verb,
+    chosen_experiment,
     method,
-    natural,
+    path,
+    refuse_folder_of_others,
     run_settings,
+    seed,
 )
 from mtcsirl.errors import UserError
+from mtcsirl.names import EXPERIMENTS
 
 AGENT_FILES = "policy.safetensors/.json, curve.csv, evaluation.csv, gate.json, settings.json, provenance.json"
 
@@ -36,7 +41,8 @@ def _train_expert(verbs: Verbs) -> None:
         from mtcsirl.settings.runs import AgentRunSettings, expert_run
         from mtcsirl.stages import training as stages
 
-        settings = run_settings(parsed, AgentRunSettings, lambda s: expert_run(s, parsed.task, parsed.cs_reward))
+        run = partial(expert_run, task=parsed.task, cs_reward=parsed.cs_reward)
+        settings = run_settings(parsed, AgentRunSettings, run, "train_expert")
         job = stages.expert_job(settings, parsed.task, parsed.target, parsed.cs_reward, parsed.seed)
         stages.train(job, parsed.output)
 
@@ -58,7 +64,7 @@ def _train_sac(verbs: Verbs) -> None:
         from mtcsirl.settings.runs import AgentRunSettings, baseline_run
         from mtcsirl.stages import training as stages
 
-        settings = run_settings(parsed, AgentRunSettings, lambda s: baseline_run(s, parsed.task))
+        settings = run_settings(parsed, AgentRunSettings, lambda s: baseline_run(s, parsed.task), "train_sac")
         stages.train(stages.sac_job(settings, parsed.task, parsed.target, parsed.seed), parsed.output)
 
     verb = add_verb(
@@ -79,7 +85,7 @@ def _collect_demonstrations(verbs: Verbs) -> None:
         from mtcsirl.settings.runs import DemonstrationRunSettings, demonstration_run
         from mtcsirl.stages import training as stages
 
-        settings = run_settings(parsed, DemonstrationRunSettings, demonstration_run)
+        settings = run_settings(parsed, DemonstrationRunSettings, demonstration_run, "collect_demonstrations")
         stages.collect_demonstrations(
             settings, parsed.expert, parsed.task, parsed.target, parsed.cs_reward, parsed.output
         )
@@ -101,15 +107,14 @@ def _collect_demonstrations(verbs: Verbs) -> None:
 
 def _learn_reward(verbs: Verbs) -> None:
     def run(parsed: argparse.Namespace) -> None:
-        from mtcsirl.episodes.demonstrations import task_of
+        from mtcsirl.episodes.demonstrations import member_of
         from mtcsirl.settings.runs import IrlRunSettings, irl_run
         from mtcsirl.stages import training as stages
 
-        files = parsed.demonstrations
-        experiment = "multi_task" if len(files) > 1 else "single_target"
-        settings = run_settings(
-            parsed, IrlRunSettings, lambda s: irl_run(s, experiment, [task_of(file) for file in files])
-        )
+        members = [member_of(file) for file in parsed.demonstrations]
+        experiment = chosen_experiment(parsed.experiment, members)
+        run = partial(irl_run, experiment=experiment, tasks={task for task, _ in members}, method=parsed.method)
+        settings = run_settings(parsed, IrlRunSettings, run, "learn_reward")
         stages.learn_reward(
             settings, parsed.method, parsed.cs_reward, parsed.demonstrations, parsed.seed, parsed.output
         )
@@ -125,8 +130,11 @@ def _learn_reward(verbs: Verbs) -> None:
     )
     verb.add_argument("--method", required=True, type=method, metavar="NAME", help="mt_csirl, mt_airl, ...")
     add_cs_reward(verb)
-    verb.add_argument("--seed", required=True, type=natural, help="seed of every random number of the run")
-    verb.add_argument("--demonstrations", required=True, nargs="+", type=Path, metavar="FILE", help="Parquet files")
+    verb.add_argument("--seed", required=True, type=seed, help="seed of every random number of the run")
+    verb.add_argument("--demonstrations", required=True, nargs="+", type=path, metavar="FILE", help="Parquet files")
+    verb.add_argument(
+        "--experiment", choices=EXPERIMENTS, help="default: what the tasks and targets of the demonstrations make it"
+    )
     add_run_settings(verb)
     add_output(verb)
 
@@ -136,7 +144,7 @@ def _transfer(verbs: Verbs) -> None:
         from mtcsirl.settings.runs import AgentRunSettings, transfer_run
         from mtcsirl.stages import training as stages
 
-        settings = run_settings(parsed, AgentRunSettings, lambda s: transfer_run(s, parsed.task))
+        settings = run_settings(parsed, AgentRunSettings, lambda s: transfer_run(s, parsed.task), "transfer")
         job = stages.transfer_job(
             settings,
             parsed.reward,
@@ -173,7 +181,7 @@ def _score_reward(verbs: Verbs) -> None:
         from mtcsirl.settings.runs import ScoreRunSettings, score_run
         from mtcsirl.stages import training as stages
 
-        settings = run_settings(parsed, ScoreRunSettings, score_run)
+        settings = run_settings(parsed, ScoreRunSettings, score_run, "score_reward")
         stages.score_reward(
             settings,
             parsed.reward,
@@ -210,6 +218,7 @@ def _evaluate(verbs: Verbs) -> None:
         from mtcsirl.files.storage import write_csv
         from mtcsirl.settings.runs import AgentRunSettings, baseline_run
 
+        refuse_folder_of_others(parsed.output)
         settings = run_settings(parsed, AgentRunSettings, lambda s: baseline_run(s, parsed.task))
         policy = load_policy(parsed.policy)
         rows = evaluate(policy, parsed.task, parsed.target, parsed.cs_reward, parsed.seed, settings)
@@ -233,6 +242,7 @@ def _evaluate(verbs: Verbs) -> None:
 
 
 def _folder(text: str) -> Path:
-    if not Path(text).is_dir():
+    folder = path(text)
+    if not folder.is_dir():
         raise UserError(f"{text}: no such folder; run the stage that makes it first")
-    return Path(text)
+    return folder

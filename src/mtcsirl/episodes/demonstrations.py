@@ -105,13 +105,13 @@ def load_demonstrations(files: Sequence[Path | str], *, episodes: int, observati
     return Demonstrations(tuple(loaded), Transitions(*(torch.stack(p) for p in zip(*loaded.values(), strict=True))))
 
 
-def task_of(file: Path | str) -> str:
-    """The task of a file of demonstrations, whose transitions are not read.
+def member_of(file: Path | str) -> tuple[str, int]:
+    """Task and target of a file of demonstrations, whose transitions are not read.
 
     Raises:
         UserError: the file is missing, truncated, or holds several tasks or targets.
     """
-    return _member(file, read_parquet(file, ("task", "target")))[0]
+    return _member(file, read_parquet(file, ("task", "target")))
 
 
 def _member(file: Path | str, frame: pd.DataFrame) -> tuple[str, int]:

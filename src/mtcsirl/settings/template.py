@@ -60,6 +60,17 @@ def deviations(settings: BaseModel) -> list[Deviation]:
     return found
 
 
+def fallbacks(settings: Settings) -> list[str]:
+    """What a cs-reward that the configuration does not know gets, one line per key."""
+    notes = []
+    for name in settings.cs_rewards:
+        if name not in settings.expert.cs_weight:
+            notes.append(f"{name}: has no expert.cs_weight; its experts take 1.0")
+        if f"expert_{name}" not in type(settings.gates).model_fields:
+            notes.append(f"{name}: has no gate of its own; its experts take gates.expert_velocity")
+    return notes
+
+
 def template(settings: Settings | None = None) -> str:
     """``settings`` (default: the desk scale) as YAML in which every key is commented; loading it gives ``settings``."""
     return HEAD + "\n".join(_lines(settings or Settings(), "")) + "\n"
