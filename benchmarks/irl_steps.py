@@ -137,7 +137,7 @@ class _Imitation:
             "steps_per_iteration": irl.steps_per_iteration,
             "generator_updates": irl.generator_updates,
             "sac_minibatch": sac.minibatch,
-            "temperature": irl.temperature,
+            "temperature": Settings().irl.temperature,
             "sac_hidden_sizes": sac.hidden_sizes,
             "hidden_sizes": irl.discriminator.hidden_sizes,
             "minibatch": irl.discriminator.minibatch,

@@ -27,7 +27,8 @@ def words(file: Path) -> frozenset[str]:
 def references() -> list[tuple[str, str]]:
     """(file, name) wherever the methods page has ``file.py: name``; a name may be ``Class.method``."""
     text = (CHECKOUT / "docs" / "methods.md").read_text(encoding="utf-8")
-    return sorted(set(re.findall(r"`([\w/]+\.py): ([\w.]+)`", text)))
+    of_the_trainer = [("irl/trainer.py", name) for name in re.findall(r"`(IrlTrainer\.\w+)`", text)]
+    return sorted({*re.findall(r"`([\w/]+\.py): ([\w.]+)`", text), *of_the_trainer})
 
 
 @pytest.mark.parametrize(("file", "name"), references())

@@ -16,6 +16,7 @@ from mtcsirl import __version__
 from mtcsirl.commands import artefacts, diagnostics, export, stages, study, together, validate, video
 from mtcsirl.errors import UserError
 from mtcsirl.extensions import load_from_environment
+from mtcsirl.worlds.variables import backend
 
 THREADS = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS")
 
@@ -49,6 +50,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     logging.basicConfig(level=logging.INFO, format="%(asctime)s %(message)s", datefmt="%H:%M:%S", stream=sys.stderr)
     signal.signal(signal.SIGTERM, _stop)
     try:
+        backend(os.environ)
         load_from_environment()
         parsed = parser().parse_args(arguments)
         parsed.run(parsed)
@@ -61,6 +63,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 130
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    except OSError as error:
+        if error.strerror is None:
+            raise
+        print(f"mtcsirl: {error.filename or 'writing'}: {error.strerror}", file=sys.stderr)
+        return 2
     return 0
 
 

@@ -10,6 +10,7 @@ from mtcsirl.files.storage import write_parquet
 from mtcsirl.settings import (
     DiscriminatorSettings,
     EvaluationSettings,
+    GeneratorSettings,
     IrlSettings,
     LearnerSettings,
     ProgressSettings,
@@ -46,10 +47,11 @@ def irl_settings(**irl) -> IrlRunSettings:
         "centre": True,
         "discriminator": discriminator,
     } | irl
+    generators = GeneratorSettings(**{name: chosen.pop(name) for name in GeneratorSettings.model_fields if name in irl})
     settings = IrlSettings(**chosen)
     learner = LearnerSettings(hidden_sizes=(16, 16), minibatch=32, random_steps=30)
     return IrlRunSettings(
-        sac=settings.scaling().sac(learner),
+        sac=generators.scaling().sac(learner),
         irl=settings,
         demonstration_episodes=2,
         evaluation=EvaluationSettings(episodes=1, episode_steps=60),

@@ -11,7 +11,7 @@ import yaml
 from pydantic import ValidationError
 
 from mtcsirl.errors import UserError
-from mtcsirl.irl.methods import METHODS
+from mtcsirl.extensions import METHODS
 from mtcsirl.rewards.ground_truth import COMMON_SENSE_REWARDS
 from mtcsirl.settings import Settings, granted
 from mtcsirl.settings.loading import load, merge, override, read_yaml, validate

@@ -15,8 +15,8 @@ from mtcsirl.errors import UserError
 from mtcsirl.extensions import VARIABLE
 from mtcsirl.files.identity import marker
 from mtcsirl.names import TASKS
-from mtcsirl.settings import Settings
-from mtcsirl.settings.loading import validate
+from mtcsirl.settings.loading import configured, read_yaml
+from mtcsirl.settings.machine import check_study
 from mtcsirl.settings.template import as_json
 from mtcsirl.study.ablations import ABLATIONS
 from mtcsirl.study.artefacts import HEAT_MAPS, settle_artefacts
@@ -25,7 +25,11 @@ from mtcsirl.study.runs import FIELDS, Baseline, Demonstrations, Expert, IrlRun,
 from mtcsirl.study.standing import settle
 
 try:
-    SETTINGS = validate(Settings, config)
+    for file in workflow.configfiles if workflow.is_main_process else ():
+        read_yaml(file)  # Snakemake has read them too, but takes what is ambiguous without a word
+    SETTINGS = configured(config)
+    if workflow.is_main_process and workflow.resource_settings.nodes is None:
+        check_study(SETTINGS)  # jobs run here and not on the nodes of a cluster
 except UserError as error:
     sys.exit(str(error))
 

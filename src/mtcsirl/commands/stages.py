@@ -1,6 +1,7 @@
 """The verbs that train, learn and measure: one per stage of the DAG, and ``evaluate``."""
 
 import argparse
+from functools import partial
 from pathlib import Path
 
 from mtcsirl.commands.arguments import (
@@ -11,11 +12,15 @@ from mtcsirl.commands.arguments import (
     add_output,
     add_run_settings,
     add_verb,
+    chosen_experiment,
     method,
-    natural,
+    path,
+    refuse_folder_of_others,
     run_settings,
+    seed,
 )
 from mtcsirl.errors import UserError
+from mtcsirl.names import EXPERIMENTS
 
 AGENT_FILES = "policy.safetensors/.json, curve.csv, evaluation.csv, gate.json, settings.json, provenance.json"
 
@@ -37,7 +42,8 @@ def _train_expert(verbs: Verbs) -> None:
         from mtcsirl.stages.train_expert import train_expert
         from mtcsirl.study.runs import Expert
 
-        settings = run_settings(parsed, AgentRunSettings, lambda s: expert_run(s, parsed.task, parsed.cs_reward))
+        own = partial(expert_run, task=parsed.task, cs_reward=parsed.cs_reward)
+        settings = run_settings(parsed, AgentRunSettings, own, "train_expert")
         expert = Expert(parsed.cs_reward, parsed.task, parsed.target, parsed.seed)
         train_expert(settings, expert, parsed.output, wanted=parsed.identity)
 
@@ -61,7 +67,7 @@ def _train_sac(verbs: Verbs) -> None:
         from mtcsirl.stages.train_sac import train_sac
         from mtcsirl.study.runs import Baseline
 
-        settings = run_settings(parsed, AgentRunSettings, lambda s: baseline_run(s, parsed.task))
+        settings = run_settings(parsed, AgentRunSettings, lambda s: baseline_run(s, parsed.task), "train_sac")
         train_sac(settings, Baseline(parsed.task, parsed.target, parsed.seed), parsed.output, wanted=parsed.identity)
 
     verb = add_verb(
@@ -84,7 +90,7 @@ def _collect_demonstrations(verbs: Verbs) -> None:
         from mtcsirl.stages.collect_demonstrations import collect_demonstrations
         from mtcsirl.study.runs import Demonstrations, Expert
 
-        settings = run_settings(parsed, DemonstrationRunSettings, demonstration_run)
+        settings = run_settings(parsed, DemonstrationRunSettings, demonstration_run, "collect_demonstrations")
         shown = Demonstrations(Expert(parsed.cs_reward, parsed.task, parsed.target, parsed.seed))
         collect_demonstrations(settings, shown, parsed.expert, parsed.output, wanted=parsed.identity)
 
@@ -111,7 +117,9 @@ def _learn_reward(verbs: Verbs) -> None:
 
         members = [member_of(file) for file in parsed.demonstrations]
         experiment, source = experiment_of(members)
-        settings = run_settings(parsed, IrlRunSettings, lambda s: irl_run(s, experiment, {task for task, _ in members}))
+        chosen_experiment(parsed.experiment, members)
+        own = partial(irl_run, experiment=experiment, tasks={task for task, _ in members}, method=parsed.method)
+        settings = run_settings(parsed, IrlRunSettings, own, "learn_reward")
         learning = Learning(experiment, parsed.method, parsed.cs_reward, source, parsed.seed)
         learn_reward(settings, learning, parsed.demonstrations, parsed.output, wanted=parsed.identity)
 
@@ -126,8 +134,11 @@ def _learn_reward(verbs: Verbs) -> None:
     )
     verb.add_argument("--method", required=True, type=method, metavar="NAME", help="mt_csirl, mt_airl, ...")
     add_cs_reward(verb)
-    verb.add_argument("--seed", required=True, type=natural, help="seed of every random number of the run")
-    verb.add_argument("--demonstrations", required=True, nargs="+", type=Path, metavar="FILE", help="Parquet files")
+    verb.add_argument("--seed", required=True, type=seed, help="seed of every random number of the run")
+    verb.add_argument("--demonstrations", required=True, nargs="+", type=path, metavar="FILE", help="Parquet files")
+    verb.add_argument(
+        "--experiment", choices=EXPERIMENTS, help="default: what the tasks and targets of the demonstrations make it"
+    )
     add_run_settings(verb)
     add_output(verb)
     add_identity(verb)
@@ -138,7 +149,7 @@ def _transfer(verbs: Verbs) -> None:
         from mtcsirl.settings.runs import AgentRunSettings, transfer_run
         from mtcsirl.stages.transfer import NewAgent, transfer
 
-        settings = run_settings(parsed, AgentRunSettings, lambda s: transfer_run(s, parsed.task))
+        settings = run_settings(parsed, AgentRunSettings, lambda s: transfer_run(s, parsed.task), "transfer")
         agent = NewAgent(parsed.cs_reward, parsed.task, parsed.target, parsed.seed, parsed.task_reward)
         transfer(settings, parsed.reward, agent, parsed.output, wanted=parsed.identity)
 
@@ -168,7 +179,7 @@ def _score_reward(verbs: Verbs) -> None:
         from mtcsirl.settings.runs import ScoreRunSettings, score_run
         from mtcsirl.stages.score_reward import Scoring, score_reward
 
-        settings = run_settings(parsed, ScoreRunSettings, score_run)
+        settings = run_settings(parsed, ScoreRunSettings, score_run, "score_reward")
         scoring = Scoring(parsed.cs_reward, parsed.task, parsed.target, parsed.seed)
         policies = parsed.expert, parsed.baseline
         score_reward(settings, scoring, parsed.reward, *policies, parsed.output, wanted=parsed.identity)
@@ -200,6 +211,7 @@ def _evaluate(verbs: Verbs) -> None:
         from mtcsirl.files.storage import write_csv
         from mtcsirl.settings.runs import AgentRunSettings, baseline_run
 
+        refuse_folder_of_others(parsed.output)
         settings = run_settings(parsed, AgentRunSettings, lambda s: baseline_run(s, parsed.task))
         policy = load_policy(parsed.policy)
         rows = evaluate(policy, parsed.task, parsed.target, parsed.cs_reward, parsed.seed, settings)
@@ -223,6 +235,7 @@ def _evaluate(verbs: Verbs) -> None:
 
 
 def _folder(text: str) -> Path:
-    if not Path(text).is_dir():
+    folder = path(text)
+    if not folder.is_dir():
         raise UserError(f"{text}: no such folder; run the stage that makes it first")
-    return Path(text)
+    return folder

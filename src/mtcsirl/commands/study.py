@@ -6,7 +6,17 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from mtcsirl.commands.arguments import Verbs, add_artefact, add_study_settings, add_verb, study_settings
+from mtcsirl.commands.arguments import (
+    Verbs,
+    add_artefact,
+    add_study_settings,
+    add_verb,
+    file_to_write,
+    path,
+    positive,
+    study_settings,
+)
+from mtcsirl.errors import UserError
 from mtcsirl.study.ablations import ABLATIONS
 from mtcsirl.study.design import ARTEFACTS, design
 
@@ -26,8 +36,8 @@ def register(verbs: Verbs) -> None:
         writes="nothing",
     )
     add_artefact(plan)
-    plan.add_argument("--rates", type=Path, default=None, metavar="FILE", help="what calibrate wrote; default: shipped")
-    plan.add_argument("--cores", type=int, default=2, metavar="N", help="cores to spread the jobs over; default 2")
+    plan.add_argument("--rates", type=path, default=None, metavar="FILE", help="what calibrate wrote; default: shipped")
+    plan.add_argument("--cores", type=positive, default=2, metavar="N", help="cores to spread the jobs over; default 2")
     add_study_settings(plan)
 
     status = add_verb(
@@ -39,7 +49,7 @@ def register(verbs: Verbs) -> None:
         writes="nothing",
     )
     add_artefact(status)
-    status.add_argument("--cores", type=int, default=2, metavar="N", help="cores for the time left; default 2")
+    status.add_argument("--cores", type=positive, default=2, metavar="N", help="cores for the time left; default 2")
     add_study_settings(status)
 
     check = add_verb(
@@ -81,7 +91,7 @@ def register(verbs: Verbs) -> None:
         needs="a machine that has nothing else to do",
         writes="the file that plan reads, --output",
     )
-    calibrate.add_argument("--output", type=Path, required=True, metavar="FILE", help="a JSON file")
+    calibrate.add_argument("--output", type=rates_to_write, required=True, metavar="FILE", help="a JSON file")
 
 
 def _plan(parsed: argparse.Namespace) -> None:
@@ -167,7 +177,8 @@ def _deviations(parsed: argparse.Namespace) -> None:
 
 
 def _settings(parsed: argparse.Namespace) -> None:
-    from mtcsirl.settings.template import schema, template
+    from mtcsirl.settings.machine import check_study
+    from mtcsirl.settings.template import fallbacks, schema, template
 
     if parsed.form == "defaults":
         print(template(), end="")
@@ -180,7 +191,23 @@ def _settings(parsed: argparse.Namespace) -> None:
     elif parsed.form == "schema":
         print(json.dumps(schema(), indent=2))
     else:
+        check_study(settings)
         print(f"valid: scale {settings.scale}")
+        for note in fallbacks(settings):
+            print(note)
+
+
+def rates_to_write(given: str) -> Path:
+    """A file for rates: a new one, or one that holds rates already."""
+    from mtcsirl.study.plan import load_rates
+
+    file = file_to_write(given)
+    if file.exists():
+        try:
+            load_rates(file)
+        except UserError as error:
+            raise UserError(f"{file}: is there and holds no rates; choose another name") from error
+    return file
 
 
 def _calibrate(parsed: argparse.Namespace) -> None:

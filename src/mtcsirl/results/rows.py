@@ -14,8 +14,7 @@ import pandas as pd
 
 from mtcsirl.errors import UserError
 from mtcsirl.files import storage
-from mtcsirl.names import DIVERGED, KEPT, LAST, distance_metric
-from mtcsirl.settings.study import CS_REWARDS
+from mtcsirl.names import CS_REWARDS, DIVERGED, KEPT, LAST, distance_metric
 from mtcsirl.study.runs import Baseline, Demonstrations, Expert, IrlRun, Run, Study, Transfer
 
 KEY = ("stage", "experiment", "method", "cs_reward", "source", "task", "target", "seed")

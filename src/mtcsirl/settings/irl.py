@@ -6,13 +6,13 @@ from pydantic import Field
 
 from mtcsirl.settings.base import Frozen, key
 from mtcsirl.settings.budgets import EXPERIMENTS, Updates
-from mtcsirl.settings.learner import RewardScaleSettings, Temperature
+from mtcsirl.settings.learner import RewardScaleSettings, Sizes, Temperature
 
 
 class DiscriminatorSettings(Frozen):
     """The learned reward f and how it is trained."""
 
-    hidden_sizes: tuple[int, ...] = key((128, 128), "hidden layers of f", unit="units", min_length=1)
+    hidden_sizes: Sizes = key((128, 128), "hidden layers of f", unit="units")
     learning_rate: float = key(1.0e-4, "Adam step size of f", gt=0)
     minibatch: int = key(256, "expert and again generator transitions per task and update", unit="transitions", gt=0)
     output_scale: float = key(10.0, "f = output_scale x network", gt=0)
@@ -21,9 +21,7 @@ class DiscriminatorSettings(Frozen):
     )
     log_pi_clamp: float = key(10.0, "log pi is clamped to +- this in the logit", unit="nats", gt=0)
     shaping: bool = key(False, "add gamma h(s') - h(s) to the logit and leave it out of the learned reward")
-    bottleneck_hidden_sizes: tuple[int, ...] = key(
-        (32, 32), "VAIRL: hidden layers of the encoder", unit="units", min_length=1
-    )
+    bottleneck_hidden_sizes: Sizes = key((32, 32), "VAIRL: hidden layers of the encoder", unit="units")
     bottleneck_size: int = key(32, "VAIRL: size of z", unit="units", gt=0)
     information_constraint: float = key(0.5, "VAIRL: I_c on the summed KL", unit="nats", gt=0)
     initial_beta: float = key(0.005, "VAIRL: start of the multiplier beta", ge=0)
@@ -98,6 +96,17 @@ class IrlAlgorithmSettings(Frozen):
         " no preference changes, the critics' targets move less",
         paper=False,
     )
+    warm_up_temperature: Literal["automatic", "as_in_irl"] = key(
+        "automatic",
+        "generators in their warm-up: automatic, as plain SAC, or that of IRL; at temperature 1 the entropy bonus hides"
+        " task rewards below 1, and a task that pays late is not found",
+    )
+    discriminator: DiscriminatorSettings = key(DiscriminatorSettings, "the learned reward")
+
+
+class GeneratorSettings(Frozen):
+    """The generators' temperature and scale in a study; a run has what ``scaling`` makes of them, in ``sac``."""
+
     temperature: Temperature = key(1.0, "generators: automatic or fixed entropy temperature", paper="automatic")
     initial_temperature: float = key(0.05, "generators: start of the automatic temperature", gt=0)
     reward_scale: float = key(
@@ -107,12 +116,6 @@ class IrlAlgorithmSettings(Frozen):
         paper=1.0,
         gt=0,
     )
-    warm_up_temperature: Literal["automatic", "as_in_irl"] = key(
-        "automatic",
-        "generators in their warm-up: automatic, as plain SAC, or that of IRL; at temperature 1 the entropy bonus hides"
-        " task rewards below 1, and a task that pays late is not found",
-    )
-    discriminator: DiscriminatorSettings = key(DiscriminatorSettings, "the learned reward")
 
     def scaling(self) -> RewardScaleSettings:
         """Temperature and scale of the generators' SAC: scaled together, they leave the optimal policy as it is."""

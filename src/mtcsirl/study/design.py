@@ -5,10 +5,10 @@ from dataclasses import replace
 from typing import TypeVar
 
 from mtcsirl.errors import UserError
+from mtcsirl.names import EVALUATION_TARGET
 from mtcsirl.settings import Settings
 from mtcsirl.study.ablations import ABLATIONS
 from mtcsirl.study.runs import (
-    EVALUATION_TARGET,
     AnyRun,
     Baseline,
     Demonstrations,

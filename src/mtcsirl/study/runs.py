@@ -31,9 +31,6 @@ from mtcsirl.settings.runs import (
 from mtcsirl.study.ablations import changes, prefix
 from mtcsirl.study.code import code_of
 
-EVALUATION_TARGET = 0
-"""Every result is read on target 0; the IRL of several targets or tasks trains on others, so it is new to it."""
-
 S = TypeVar("S", bound=Frozen, covariant=True)
 
 
@@ -233,7 +230,8 @@ class IrlRun(Run[IrlRunSettings]):
 
     def settings(self, settings: Settings) -> IrlRunSettings:
         """The slice of the configuration that the run depends on."""
-        return irl_run(varied(settings, self.variant), self.experiment, {task for task, _ in self.members})
+        tasks = {task for task, _ in self.members}
+        return irl_run(varied(settings, self.variant), self.experiment, tasks, self.method)
 
 
 def demonstrations_role(index: int, task: str, target: int) -> str:

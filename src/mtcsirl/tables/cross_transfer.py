@@ -2,10 +2,10 @@
 
 import pandas as pd
 
+from mtcsirl.names import EVALUATION_TARGET
 from mtcsirl.results.published import Published
 from mtcsirl.results.rows import select
 from mtcsirl.settings import Settings
-from mtcsirl.study.runs import EVALUATION_TARGET
 from mtcsirl.tables.cells import Cell, make_cell
 from mtcsirl.tables.table import Column, Entry, Table, result_table
 
