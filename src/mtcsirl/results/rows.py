@@ -4,8 +4,7 @@
 status. No row is dropped: a run that the study asks for and that is not there stands in the frame with value NaN.
 """
 
-from collections.abc import Iterator, Sequence
-from itertools import product
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +13,13 @@ import pandas as pd
 
 from mtcsirl.errors import UserError
 from mtcsirl.files import storage
+<<<<<<< HEAD
 from mtcsirl.names import CS_REWARDS, DIVERGED, KEPT, LAST, distance_metric
+=======
+from mtcsirl.names import DIVERGED, KEPT, LAST, distance_metric
+from mtcsirl.results.completeness import POLICIES, what_lacks
+from mtcsirl.settings.study import CS_REWARDS
+>>>>>>> records
 from mtcsirl.study.runs import Baseline, Demonstrations, Expert, IrlRun, Run, Study, Transfer
 
 KEY = ("stage", "experiment", "method", "cs_reward", "source", "task", "target", "seed")
@@ -32,8 +37,6 @@ OK, BELOW_GATE, MISSING, DUPLICATED, FOREIGN, INCOMPLETE = (
 evaluation. Duplicated: the numbers of another seed, or an episode twice. Foreign: the file names another task, target
 or seed than its folder. Incomplete: not the episodes, policies and metrics that the settings ask for, or values
 that are no numbers; ``lacks`` says which. The last four have the value NaN: nothing is averaged over the rest."""
-
-POLICIES = ("stochastic", "deterministic")
 
 
 def evaluation_rows(
@@ -196,24 +199,6 @@ def _agent_rows(agent: dict[str, Any], folder: Path, names: tuple[str, ...], ask
             diverged = {policy: int(groups.get_group((policy, DIVERGED)).sum()) for policy in POLICIES}
             rows["diverged"] = rows.index.get_level_values("policy").map(diverged)
     return rows.reset_index().assign(**agent, kept=kept, status=status, lacks=lacks, folder=str(folder))
-
-
-def what_lacks(rows: pd.DataFrame, names: Sequence[str], asked: int) -> str:
-    """What the episodes of one agent lack of ``asked`` whole ones of each policy, each with the metrics ``names``.
-
-    "" if nothing: every policy and metric has exactly the episodes 0 to ``asked`` - 1, and all values are finite.
-    """
-    needed = rows[rows["metric"].isin(names) & rows["policy"].isin(POLICIES)]
-    cells = set(zip(needed["policy"], needed["metric"], needed["episode"], strict=True))
-    wanted = set(product(POLICIES, names, range(asked)))
-    if cells != wanted:
-        policy, metric, _ = min(cells ^ wanted)
-        found = sum(cell[:2] == (policy, metric) for cell in cells)
-        return f"{policy} {metric}: {found} of {asked} episodes"
-    broken = needed[~np.isfinite(needed["value"].to_numpy(dtype=float))]
-    for policy, metric, episode in broken[["policy", "metric", "episode"]].itertuples(index=False):
-        return f"{policy} {metric}: episode {int(episode)} has no number"
-    return ""
 
 
 def _demonstration_rows(run: Demonstrations, folder: Path, partial: bool) -> pd.DataFrame:
