@@ -13,13 +13,8 @@ import pandas as pd
 
 from mtcsirl.errors import UserError
 from mtcsirl.files import storage
-<<<<<<< HEAD
 from mtcsirl.names import CS_REWARDS, DIVERGED, KEPT, LAST, distance_metric
-=======
-from mtcsirl.names import DIVERGED, KEPT, LAST, distance_metric
 from mtcsirl.results.completeness import POLICIES, what_lacks
-from mtcsirl.settings.study import CS_REWARDS
->>>>>>> records
 from mtcsirl.study.runs import Baseline, Demonstrations, Expert, IrlRun, Run, Study, Transfer
 
 KEY = ("stage", "experiment", "method", "cs_reward", "source", "task", "target", "seed")
