@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 from pydantic import BaseModel
 
 from mtcsirl.errors import UserError
-from mtcsirl.files.writable import check_file, check_folder
+from mtcsirl.files.storage import check_writable
 from mtcsirl.names import EXPERIMENTS, HIGHEST_SEED, HIGHEST_TARGET_SEED, TARGETS_PER_TASK, TASKS
 from mtcsirl.settings import Settings
 from mtcsirl.settings.loading import configured, load, override, read_yaml, validate
@@ -107,12 +107,7 @@ def add_cs_reward(verb: argparse.ArgumentParser) -> None:
 def add_output(verb: argparse.ArgumentParser, default: str | None = None) -> None:
     """``--output``."""
     verb.add_argument(
-        "--output",
-        required=default is None,
-        default=default,
-        type=folder_to_write,
-        metavar="DIR",
-        help="folder to write to",
+        "--output", required=default is None, default=default, type=new_folder, metavar="DIR", help="folder to write to"
     )
 
 
@@ -135,6 +130,22 @@ def target(text: str) -> int:
     if not text.isdecimal() or int(text) >= TARGETS_PER_TASK:
         raise argparse.ArgumentTypeError(f"target {text!r}: must be 0 ... {TARGETS_PER_TASK - 1}")
     return int(text)
+
+
+def new_folder(text: str) -> Path:
+    """A folder that can be written, or made."""
+    return _writable(text, folder=True)
+
+
+def new_file(text: str) -> Path:
+    """A file that can be written."""
+    return _writable(text, folder=False)
+
+
+def _writable(text: str, *, folder: bool) -> Path:
+    place = path(text)
+    check_writable(place, folder=folder)
+    return place
 
 
 def natural(text: str) -> int:
@@ -174,20 +185,6 @@ def text(given: str) -> str:
 def path(given: str) -> Path:
     """A path that is not empty: that would be the working folder."""
     return Path(text(given))
-
-
-def folder_to_write(given: str) -> Path:
-    """A folder that can be written, there or not."""
-    folder = path(given)
-    check_folder(folder)
-    return folder
-
-
-def file_to_write(given: str) -> Path:
-    """A file that can be written, there or not."""
-    file = path(given)
-    check_file(file)
-    return file
 
 
 def cs_reward(name: str) -> str:

@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 
 from mtcsirl.commands.arguments import Verbs, add_artefact, add_study_settings, add_verb, positive, study_settings
-from mtcsirl.files.writable import check_folder
+from mtcsirl.files.storage import check_writable
 from mtcsirl.settings.machine import check_study
 
 AGENT_STAGES = ("train_sac", "train_expert", "transfer")
@@ -32,7 +32,7 @@ def _run(parsed: argparse.Namespace) -> None:
 
     settings = study_settings(parsed)
     check_study(settings)
-    check_folder(settings.results)
+    check_writable(settings.results, folder=True)
     runs = [run for run in design(settings, parsed.target) if run.stage in parsed.stages]
     trained = train_together(runs, settings, Path(settings.results), most=parsed.most)
     print(f"{trained} agents trained")
