@@ -84,7 +84,7 @@ def _irl_on_meta_world() -> Callable[[], None]:
     policy = FusedSac(1, settings.sac, seeds=[0]).policy(0)
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "demonstrations.parquet"
-        write_parquet(file, collect_demonstrations(policy, TASK, 0, run, seed=0))
+        write_parquet(file, collect_demonstrations(policy, TASK, 0, run, seed=0, cs_reward="velocity"))
         return make_trainer("mt_csirl", "velocity", [file], 0, settings).iterate
 
 

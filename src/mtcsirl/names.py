@@ -113,3 +113,15 @@ AGENTS = {
 def agent_label(name: str) -> str:
     """How a method or agent is called in a table or figure; one that the suite does not ship keeps its own name."""
     return AGENTS.get(name, name.replace("_", "-").upper())
+
+
+KEPT, LAST = "kept", "last"
+"""Which policy of a training a row of an evaluation is about: the one that the run leaves behind, or the last."""
+
+DIVERGED = "diverged"
+"""The metric that is 1 in an episode whose simulation diverged, else 0."""
+
+
+def distance_metric(cs_reward: str) -> str:
+    """The metric E|m - target| of a cs-reward's measure m: minus its mean unweighted ground-truth reward."""
+    return f"{cs_reward}_distance"

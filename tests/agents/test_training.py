@@ -129,11 +129,12 @@ def test_rows(small_run):
         "cs_reward",
         "seed",
         "policy",
+        "kept",
         "episode",
         "metric",
         "value",
     ]
-    assert len(evaluation) == 2 * 2 * 4
+    assert (evaluation["kept"] == "kept").sum() == 2 * 2 * 7
     assert lines[-1].startswith("step 300/300")
     assert all(word in lines[-1] for word in ("steps/s", "left", "success", "|a|_1", "velocity", "temperature"))
 

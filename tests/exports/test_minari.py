@@ -27,6 +27,7 @@ def demonstrations(tmp_path: Path) -> Path:
             "task_reward": float(step),
             "task": "reach",
             "target": 3,
+            "cs_reward": "velocity",
             "episode": episode,
             "step": step,
             "success": step == STEPS - 1,

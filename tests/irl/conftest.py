@@ -29,7 +29,8 @@ def demonstrations(tmp_path_factory) -> list[Path]:
     files = []
     for task, target in MEMBERS:
         files.append(folder / f"{task}.parquet")
-        write_parquet(files[-1], collect_demonstrations(policy, task, target, settings, seed=target))
+        frame = collect_demonstrations(policy, task, target, settings, seed=target, cs_reward="velocity")
+        write_parquet(files[-1], frame)
     return files
 
 

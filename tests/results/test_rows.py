@@ -12,6 +12,7 @@ from mtcsirl.results.rows import (
     ablated_generators,
     curve_rows,
     evaluation_rows,
+    last_rows,
     matrix,
     point_rows,
     score_rows,
@@ -53,7 +54,7 @@ def velocity(rows, **key):
 
 
 def test_every_agent_of_the_study_with_its_mean_over_episodes(results):
-    rows = evaluation_rows(STUDY, results)
+    rows = evaluation_rows(STUDY, results, episodes=2)
     assert set(rows["status"]) == {"ok"}
     agents = rows[rows["stage"] != "collect_demonstrations"].drop_duplicates(list(rows_module.KEY))
     members = sum(len(run.members) for run in STUDY.irl_runs)
@@ -65,7 +66,7 @@ def test_every_agent_of_the_study_with_its_mean_over_episodes(results):
 
 
 def test_matrix_is_seeds_by_tasks_and_refuses_a_mixture(results):
-    rows = evaluation_rows(STUDY, results)
+    rows = evaluation_rows(STUDY, results, episodes=2)
     transfers = velocity(rows, stage="transfer")
     assert matrix(transfers).shape == (3, 1)
     with pytest.raises(ValueError, match="more than one row"):
@@ -75,7 +76,7 @@ def test_matrix_is_seeds_by_tasks_and_refuses_a_mixture(results):
 def test_missing_run_stops_the_full_load_with_the_command_that_makes_it(results):
     shutil.rmtree(results / STUDY.transfers[1].folder)
     with pytest.raises(UserError) as error:
-        evaluation_rows(STUDY, results)
+        evaluation_rows(STUDY, results, episodes=2)
     named = re.search(r"snakemake --cores 1 (\S+)`", str(error.value))
     assert named is not None
     assert named[1] == str(results / STUDY.transfers[1].folder / "evaluation.csv")
@@ -84,13 +85,13 @@ def test_missing_run_stops_the_full_load_with_the_command_that_makes_it(results)
 
 def test_missing_run_stays_in_the_partial_frame(results):
     shutil.rmtree(results / STUDY.transfers[1].folder)
-    rows = velocity(evaluation_rows(STUDY, results, partial=True), stage="transfer")
+    rows = velocity(evaluation_rows(STUDY, results, episodes=2, partial=True), stage="transfer")
     assert rows["status"].tolist() == ["ok", "missing", "ok"]
     assert rows["value"].isna().tolist() == [False, True, False]
 
 
 def test_nothing_there_yet_is_a_frame_of_missing_runs(tmp_path):
-    rows = evaluation_rows(STUDY, tmp_path, partial=True)
+    rows = evaluation_rows(STUDY, tmp_path, episodes=2, partial=True)
     assert set(rows["status"]) == {"missing"}
     assert rows["value"].isna().all()
     for load in (curve_rows, score_rows, point_rows):
@@ -102,10 +103,10 @@ def test_nothing_there_yet_is_a_frame_of_missing_runs(tmp_path):
 def test_generators_of_an_ablation_carry_its_name(tmp_path):
     """They have the keys of the main study's generators, which they must not be taken for."""
     study = variants(SETTINGS, "ablation_curriculum")["constant"]
-    missing = ablated_generators(study, tmp_path, "ablation_curriculum")
+    missing = ablated_generators(study, tmp_path, "ablation_curriculum", episodes=2)
     for run in study.irl_runs:
         write_run(run, tmp_path, means)
-    rows = ablated_generators(study, tmp_path, "ablation_curriculum")
+    rows = ablated_generators(study, tmp_path, "ablation_curriculum", episodes=2)
     assert set(missing["status"]) == {"missing"}
     assert set(rows["status"]) == {"ok"}
     assert set(rows["stage"]) == {"learn_reward"}
@@ -115,24 +116,26 @@ def test_generators_of_an_ablation_carry_its_name(tmp_path):
 
 def test_agent_below_its_gate_counts_and_is_marked(results):
     write_run(STUDY.experts[0], results, means, passed=False)
-    rows = velocity(evaluation_rows(STUDY, results), stage="train_expert", task=STUDY.experts[0].task)
+    rows = velocity(evaluation_rows(STUDY, results, episodes=2), stage="train_expert", task=STUDY.experts[0].task)
     assert (rows["status"] == "below gate").sum() == 1
     assert rows["value"].notna().all()
 
 
 def test_demonstrations_stand_beside_their_expert_with_their_own_gate(results):
-    rows = select(evaluation_rows(STUDY, results), stage="collect_demonstrations")
+    rows = select(evaluation_rows(STUDY, results, episodes=2), stage="collect_demonstrations")
     assert len(rows) == 2 * len(STUDY.demonstrations)
     assert set(rows["status"]) == {"ok"}
     assert set(rows["seed"]) == {SETTINGS.seeds[0]}
     write_demonstrations(STUDY.demonstrations[0], results, passed=False)
-    rows = select(evaluation_rows(STUDY, results), stage="collect_demonstrations", task=STUDY.demonstrations[0].task)
+    rows = select(
+        evaluation_rows(STUDY, results, episodes=2), stage="collect_demonstrations", task=STUDY.demonstrations[0].task
+    )
     assert set(rows["status"]) == {"below gate"}
     assert select(rows, metric="success")["value"].tolist() == [0.6]
     (results / STUDY.demonstrations[0].folder / "gate.json").unlink()
     with pytest.raises(UserError, match="is missing"):
-        evaluation_rows(STUDY, results)
-    rows = select(evaluation_rows(STUDY, results, partial=True), stage="collect_demonstrations")
+        evaluation_rows(STUDY, results, episodes=2)
+    rows = select(evaluation_rows(STUDY, results, episodes=2, partial=True), stage="collect_demonstrations")
     assert (rows["status"] == "missing").sum() == 2
 
 
@@ -142,7 +145,7 @@ def test_copied_seed_is_flagged_and_not_averaged(results):
     shutil.copytree(results / first.folder, results / second.folder, dirs_exist_ok=True)
     episodes = storage.read_csv(results / first.folder / "evaluation.csv")
     storage.write_csv(results / third.folder / "evaluation.csv", episodes.assign(seed=third.seed))
-    rows = velocity(evaluation_rows(STUDY, results), stage="transfer")
+    rows = velocity(evaluation_rows(STUDY, results, episodes=2), stage="transfer")
     assert rows["status"].tolist() == ["ok", "foreign", "duplicated"]
     assert rows["value"].isna().tolist() == [False, True, True]
 
@@ -151,16 +154,126 @@ def test_episode_twice_is_flagged(results):
     path = results / STUDY.baselines[0].folder / "evaluation.csv"
     episodes = storage.read_csv(path)
     storage.write_csv(path, pd.concat([episodes, episodes]))
-    rows = velocity(evaluation_rows(STUDY, results), stage="train_sac", seed=STUDY.baselines[0].seed)
+    rows = velocity(evaluation_rows(STUDY, results, episodes=2), stage="train_sac", seed=STUDY.baselines[0].seed)
     assert rows["status"].tolist() == ["duplicated"]
     assert np.isnan(rows["value"]).all()
+
+
+def change(results, run, alter):
+    """Rewrite an agent's evaluation; ``alter`` takes the frame and the mask of its stochastic velocities."""
+    path = results / run.folder / "evaluation.csv"
+    frame = storage.read_csv(path)
+    mask = (frame["policy"] == "stochastic") & (frame["metric"] == "velocity")
+    storage.write_csv(path, alter(frame, mask))
+
+
+@pytest.mark.parametrize(
+    ("alter", "lacks"),
+    [
+        (lambda f, m: f.assign(value=f["value"].mask(m & (f["episode"] == 1))),
+         "stochastic velocity: episode 1 has no number"),
+        (lambda f, m: f.assign(value=f["value"].mask(m & (f["episode"] == 1), np.inf)),
+         "stochastic velocity: episode 1 has no number"),
+        (lambda f, m: f.assign(value=np.nan), "no number"),
+        (lambda f, m: f[~(m & (f["episode"] == 0))], "stochastic velocity: 1 of 2 episodes"),
+        (lambda f, m: f[f["policy"] != "deterministic"], "deterministic .*: 0 of 2 episodes"),
+        (lambda f, m: f[f["metric"] != "velocity_distance"], "velocity_distance: 0 of 2 episodes"),
+        (lambda f, m: f[f["metric"] != "diverged"], "diverged: 0 of 2 episodes"),
+        (lambda f, m: f.assign(kept="last"), "0 of 2 episodes"),
+        (lambda f, m: pd.concat([f, f[m].assign(episode=[2, 3])]), "stochastic velocity: 4 of 2 episodes"),
+        (lambda f, m: f.iloc[:0], "0 of 2 episodes"),
+    ],
+)  # fmt: skip
+def test_incomplete_evaluation_is_marked_and_nothing_averaged_over_the_rest(results, alter, lacks):
+    run = STUDY.baselines[0]
+    change(results, run, alter)
+    rows = select(evaluation_rows(STUDY, results, episodes=2), stage="train_sac", task=run.task)
+    own, others = rows[rows["seed"] == run.seed], rows[rows["seed"] != run.seed]
+    assert set(own["status"]) == {"incomplete"}
+    assert own["value"].isna().all()
+    assert own["lacks"].str.contains(lacks).all()
+    assert set(others["status"]) == {"ok"}
+    assert others["value"].notna().all()
+    assert set(others["lacks"]) == {""}
+
+
+def test_episodes_are_those_that_the_settings_ask_for(results):
+    assert set(evaluation_rows(STUDY, results, episodes=2)["status"]) == {"ok"}
+    rows = evaluation_rows(STUDY, results, episodes=10)
+    assert set(rows.loc[rows["stage"] != "collect_demonstrations", "status"]) == {"incomplete"}
+    assert "2 of 10 episodes" in rows["lacks"].iloc[0]
+
+
+def test_without_its_gate_a_run_is_incomplete(results):
+    (results / STUDY.experts[0].folder / "gate.json").unlink()
+    rows = velocity(evaluation_rows(STUDY, results, episodes=2), stage="train_expert", task=STUDY.experts[0].task)
+    assert (rows["status"] == "incomplete").sum() == 1
+    assert "gate.json" in set(rows["lacks"])
+    storage.write_json(results / STUDY.experts[0].folder / "gate.json", {"hello": 1})
+    with pytest.raises(UserError, match=r"gate\.json: not the verdict of a gate"):
+        evaluation_rows(STUDY, results, episodes=2)
+
+
+@pytest.mark.parametrize(("column", "text"), [("value", "abc"), ("episode", "first"), ("seed", "zero")])
+def test_text_in_a_column_of_numbers_is_one_line(results, column, text):
+    run = STUDY.baselines[0]
+    change(
+        results,
+        run,
+        lambda frame, mask: frame.astype({column: object}).assign(
+            **{column: frame[column].astype(object).where(~mask, text)}
+        ),
+    )
+    with pytest.raises(UserError, match=rf"evaluation\.csv: column {column} holds '{text}', not a number") as error:
+        evaluation_rows(STUDY, results, episodes=2)
+    assert "\n" not in str(error.value)
+
+
+def test_diverged_episodes_are_counted(results):
+    run = STUDY.baselines[0]
+    change(results, run, lambda f, m: f.assign(
+        value=f["value"].mask((f["metric"] == "diverged") & (f["policy"] == "stochastic") & (f["episode"] == 1), 1.0)
+    ))  # fmt: skip
+    rows = select(evaluation_rows(STUDY, results, episodes=2), stage="train_sac", task=run.task)
+    assert set(rows["status"]) == {"ok"}
+    counted = rows[rows["diverged"] == 1]
+    assert set(zip(counted["seed"], counted["policy"], strict=True)) == {(run.seed, "stochastic")}
+    assert set(counted["metric"]) == {"success", "velocity", "action_norm", "velocity_distance",
+                                      "action_norm_distance", "task_reward"}  # fmt: skip
+
+
+def test_the_last_policy_is_read_beside_the_kept_one_and_never_for_it(results):
+    run = STUDY.baselines[0]
+    kept = evaluation_rows(STUDY, results, episodes=2)
+    change(results, run, lambda f, m: pd.concat([f, f.assign(kept="last", value=f["value"].mask(m, 0.11))]))
+    pd.testing.assert_frame_equal(evaluation_rows(STUDY, results, episodes=2), kept)
+    last = last_rows(STUDY, results, episodes=2)
+    assert set(last["stage"]) == {"train_expert", "train_sac"}
+    own = velocity(last, stage="train_sac", task=run.task, seed=run.seed)
+    assert (own["value"].tolist(), own["status"].tolist(), own["kept"].tolist()) == ([0.11], ["ok"], ["last"])
+    others = last[(last["stage"] == "train_expert") | (last["seed"] != run.seed)]
+    assert set(others["status"]) == {"incomplete"}, "these runs have no rows of a last policy"
+
+
+def test_distances_are_rows_too(results):
+    rows = select(evaluation_rows(STUDY, results, episodes=2), stage="train_sac", policy="stochastic")
+    assert select(rows, metric="velocity_distance")["value"].to_numpy() == pytest.approx(0.5, abs=0.02)
+
+
+def test_demonstrations_without_a_metric_have_none(results):
+    run = STUDY.demonstrations[0]
+    gate = {"gate": "expert", "passed": False, "success": 1.0, "metric": None, "diverged": 2}
+    storage.write_json(results / run.folder / "gate.json", gate)
+    rows = select(evaluation_rows(STUDY, results, episodes=2), stage="collect_demonstrations", task=run.task)
+    assert select(rows, metric="velocity")["value"].isna().all()
+    assert set(rows["diverged"]) == {2}
 
 
 def test_truncated_file_is_one_line(results):
     path = results / STUDY.baselines[0].folder / "evaluation.csv"
     storage.write_text(path, "task,target\n1,2,3,4\n")
     with pytest.raises(UserError, match=r"evaluation\.csv"):
-        evaluation_rows(STUDY, results)
+        evaluation_rows(STUDY, results, episodes=2)
 
 
 def test_curves_carry_the_key_of_their_agent(results):
@@ -183,7 +296,8 @@ def test_scores_and_points_carry_the_key_of_their_reward(tmp_path):
             "high": 0.6,
         }
         storage.write_csv(tmp_path / run.folder / "scores.csv", pd.DataFrame([score | {"n": 10}]))
-        point = {"transitions": "sac", "episode": 0, "truth": -0.1, "learned": 0.2, "task_reward": 9.0}
+        point = {"transitions": "sac", "agent": 0, "episode": 0, "truth": -0.1, "learned": 0.2, "task_reward": 9.0}
+        point |= {"random": 0.0}
         storage.write_parquet(tmp_path / run.folder / "points.parquet", pd.DataFrame([point]))
     scores, points = score_rows(study, tmp_path), point_rows(study, tmp_path)
     assert len(scores) == len(points) == len(study.scores)

@@ -20,7 +20,8 @@ from mtcsirl.agents.learners import make_learner
 from mtcsirl.agents.progress import Progress
 from mtcsirl.agents.replay import Replay
 from mtcsirl.agents.scripted import ScriptedExplorers
-from mtcsirl.episodes.evaluation import gate_verdict, measure_episode, stochastic_means
+from mtcsirl.episodes.evaluation import measure_episode
+from mtcsirl.episodes.gates import gate_verdict, stochastic_means
 from mtcsirl.episodes.lockstep import TaskEnvironments, make_environments
 from mtcsirl.episodes.policy import Policy
 from mtcsirl.files import storage
@@ -32,7 +33,7 @@ from mtcsirl.worlds.environments import ACTION_SIZE
 def train_agents(
     jobs: Sequence[AgentJob],
     *,
-    checkpoint: Path | str | None = None,
+    checkpoints: Sequence[Path] | None = None,
     log: Callable[[str], None] = print,
     events: Path | str | None = None,
     workers: int = 0,
@@ -45,6 +46,7 @@ def train_agents(
     Raises UserError when the jobs differ in more than task, target, seed, reward scale, cs_weight, curriculum or
     scripted steps.
     """
+    checkpoint = checkpoints[0] if checkpoints else None
     training = Training(jobs, checkpoint=checkpoint, log=log, events=events, workers=workers)
     try:
         training.run()

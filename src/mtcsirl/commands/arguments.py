@@ -9,7 +9,7 @@ from pydantic import BaseModel
 
 from mtcsirl.errors import UserError
 from mtcsirl.files.storage import check_writable
-from mtcsirl.names import EXPERIMENTS, HIGHEST_SEED, HIGHEST_TARGET_SEED, TARGETS_PER_TASK, TASKS
+from mtcsirl.names import HIGHEST_SEED, HIGHEST_TARGET_SEED, TARGETS_PER_TASK, TASKS
 from mtcsirl.settings import Settings
 from mtcsirl.settings.loading import configured, load, override, read_yaml, validate
 from mtcsirl.settings.machine import check_agent, check_irl
@@ -108,6 +108,15 @@ def add_output(verb: argparse.ArgumentParser, default: str | None = None) -> Non
     """``--output``."""
     verb.add_argument(
         "--output", required=default is None, default=default, type=new_folder, metavar="DIR", help="folder to write to"
+    )
+
+
+def add_identity(verb: argparse.ArgumentParser) -> None:
+    """``--identity`` of a verb that a workflow calls."""
+    verb.add_argument(
+        "--identity",
+        metavar="HASH",
+        help="what a workflow planned for; a run that would be another is refused",
     )
 
 
@@ -240,14 +249,11 @@ def refuse_folder_of_others(folder: Path, stage: str = "") -> None:
         raise UserError(f"{folder}: holds another run ({found[0]}); choose a folder of its own")
 
 
-def chosen_experiment(asked: str | None, members: Sequence[tuple[str, int]]) -> str:
-    """The experiment of an IRL run on these tasks and targets; UserError where ``asked`` contradicts them."""
-    tasks = len({task for task, _ in members})
-    found = EXPERIMENTS[2] if tasks > 1 else EXPERIMENTS[1] if len(members) > 1 else EXPERIMENTS[0]
+def check_experiment(asked: str | None, found: str, members: Sequence[tuple[str, int]]) -> None:
+    """Raise UserError where the experiment ``asked`` for is not what the tasks and targets of the run make it."""
     if asked not in (None, found):
-        targets = f"{len(members)} targets of {tasks} task{'s' if tasks > 1 else ''}"
-        raise UserError(f"--experiment {asked}: the demonstrations are of {targets}, which is {found}")
-    return found
+        names = ", ".join(f"{task}-t{target}" for task, target in members)
+        raise UserError(f"--experiment {asked}: the demonstrations are of {names}, which is {found}")
 
 
 def study_settings(parsed: argparse.Namespace) -> Settings:

@@ -8,6 +8,7 @@ from mtcsirl.commands.arguments import Verbs, add_study_settings, add_verb, new_
 from mtcsirl.commands.drawing import write_figure
 from mtcsirl.settings import Settings
 from mtcsirl.study.ablations import ABLATIONS
+from mtcsirl.study.artefacts import HEAT_MAPS, sign_artefact, unsign_artefact
 from mtcsirl.study.design import ARTEFACTS, design
 from mtcsirl.study.runs import Run
 
@@ -16,9 +17,7 @@ if TYPE_CHECKING:
 
     from mtcsirl.claims.claims import Finding
 
-AnyRun = TypeVar("AnyRun", bound=Run)
-HEAT_MAPS = {"table_1": "action_norm", "table_3": "velocity"}
-"""Tables that are also drawn, beside the paper's, and their cs-reward."""
+Kind = TypeVar("Kind", bound=Run)
 
 
 def register(verbs: Verbs) -> None:
@@ -83,9 +82,12 @@ def _table(parsed: argparse.Namespace) -> None:
 
     settings = study_settings(parsed)
     name = f"table_{parsed.number}"
-    rows = evaluation_rows(design(settings, name), settings.results, partial=parsed.partial)
+    rows = evaluation_rows(
+        design(settings, name), settings.results, episodes=settings.evaluation.episodes, partial=parsed.partial
+    )
     table = TABLES[name](rows, settings)
-    folder = parsed.output or Path(settings.results) / "tables"
+    home = Path(settings.results) / "tables"
+    folder = parsed.output or home
     write_csv(folder / f"{name}.csv", table.csv())
     write_text(folder / f"{name}.md", table.markdown())
     write_text(folder / f"{name}.tex", table.latex())
@@ -94,6 +96,7 @@ def _table(parsed: argparse.Namespace) -> None:
 
         cs_reward = HEAT_MAPS[name]
         write_figure(folder / name, heat_map(cs_reward, rows, settings), heat_map_caption(cs_reward, settings))
+    _sign(parsed, settings, name, home, folder)
     print(table.markdown())
 
 
@@ -110,8 +113,21 @@ def _figure(parsed: argparse.Namespace) -> None:
     spec = figure_spec(name)
     data = FigureData(settings=settings, **frames)
     figure, caption = spec.draw(data), spec.caption(data)
-    write_figure((parsed.output or Path(settings.figures)) / name, figure, caption)
+    home = Path(settings.figures)
+    folder = parsed.output or home
+    write_figure(folder / name, figure, caption)
+    _sign(parsed, settings, name, home, folder)
     print(f"{spec.title}. {caption}")
+
+
+def _sign(parsed: argparse.Namespace, settings: Settings, name: str, home: Path, folder: Path) -> None:
+    """Note what the files ``name``.* in ``folder`` were made from, where the DAG looks for them."""
+    if folder.resolve() != home.resolve():
+        return
+    if parsed.partial:
+        unsign_artefact(name, settings)
+    else:
+        sign_artefact(name, settings, sorted(folder.glob(f"{name}.*")))
 
 
 def _reward_quality(parsed: argparse.Namespace) -> None:
@@ -122,7 +138,9 @@ def _reward_quality(parsed: argparse.Namespace) -> None:
     runs = _there(design(settings).scores, settings, "points.parquet", parsed.partial)
     rows = read_quality(runs, settings.results, settings.score.bootstrap)
     text = quality_markdown(rows, " ".join(scale_notes(settings.scale)))
-    _write_summary((parsed.output or Path(settings.results) / "scores") / "reward_quality", rows, text)
+    home = Path(settings.results) / "scores"
+    _write_summary((parsed.output or home) / "reward_quality", rows, text)
+    _sign(parsed, settings, "reward_quality", home, parsed.output or home)
 
 
 def _diagnostics(parsed: argparse.Namespace) -> None:
@@ -133,10 +151,12 @@ def _diagnostics(parsed: argparse.Namespace) -> None:
     runs = _there(design(settings).irl_runs, settings, "gate.json", parsed.partial)
     rows = read_diagnoses(runs, settings.results)
     text = diagnoses_markdown(rows, scale_notes(settings.scale))
-    _write_summary((parsed.output or Path(settings.results) / "diagnostics") / "diagnostics", rows, text)
+    home = Path(settings.results) / "diagnostics"
+    _write_summary((parsed.output or home) / "diagnostics", rows, text)
+    _sign(parsed, settings, "diagnostics", home, parsed.output or home)
 
 
-def _there(runs: tuple[AnyRun, ...], settings: Settings, name: str, partial: bool) -> tuple[AnyRun, ...]:
+def _there(runs: tuple[Kind, ...], settings: Settings, name: str, partial: bool) -> tuple[Kind, ...]:
     """All ``runs``; if ``partial``, those that have left their file ``name``."""
     return tuple(run for run in runs if not partial or (Path(settings.results) / run.folder / name).is_file())
 
@@ -158,11 +178,16 @@ def _ablation(parsed: argparse.Namespace) -> None:
 
     settings, name = study_settings(parsed), parsed.name
     shown = variants(settings, name)
-    frames = {v: evaluation_rows(study, settings.results, partial=parsed.partial) for v, study in shown.items()}
+    frames = {
+        v: evaluation_rows(study, settings.results, episodes=settings.evaluation.episodes, partial=parsed.partial)
+        for v, study in shown.items()
+    }
     rows = variant_rows(frames)
-    write_csv((parsed.output or Path(settings.results) / "ablations") / f"{name}.csv", rows)
+    home, figures = Path(settings.results) / "ablations", parsed.figures or Path(settings.figures)
+    write_csv((parsed.output or home) / f"{name}.csv", rows)
     text = caption(name, rows, settings)
-    write_figure((parsed.figures or Path(settings.figures)) / name, draw(name, rows, settings), text)
+    write_figure(figures / name, draw(name, rows, settings), text)
+    _sign(parsed, settings, name, home, parsed.output or home)
     print(text)
 
 
@@ -173,11 +198,13 @@ def _claims(parsed: argparse.Namespace) -> None:
 
     settings = study_settings(parsed)
     findings = _judged(settings, parsed.partial)
-    folder = parsed.output or Path(settings.results) / "claims"
+    home = Path(settings.results) / "claims"
+    folder = parsed.output or home
     text = claims_markdown(findings, settings)
     write_json(folder / "claims.json", claims_json(findings, settings))
     write_text(folder / "claims.md", text)
     write_figure(folder / "claims", claims_figure(findings, settings), CAPTION)
+    _sign(parsed, settings, "claims", home, folder)
     print(text)
 
 
@@ -189,8 +216,10 @@ def _judged(settings: Settings, partial: bool) -> "list[Finding]":
     from mtcsirl.study.design import variants
 
     study, name = design(settings), "ablation_curriculum"
-    rows = evaluation_rows(study, settings.results, partial=partial)
-    without = ablated_generators(variants(settings, name)["constant"], settings.results, name)
+    rows = evaluation_rows(study, settings.results, episodes=settings.evaluation.episodes, partial=partial)
+    without = ablated_generators(
+        variants(settings, name)["constant"], settings.results, name, episodes=settings.evaluation.episodes
+    )
     scores = score_rows(study, settings.results, partial=partial)
     return judge(pd.concat([rows, without], ignore_index=True), scores, settings)
 
@@ -203,7 +232,12 @@ def _results(parsed: argparse.Namespace) -> None:
     from mtcsirl.tables import TABLES
 
     settings = study_settings(parsed)
-    rows = {name: evaluation_rows(design(settings, name), settings.results, partial=parsed.partial) for name in TABLES}
+    rows = {
+        name: evaluation_rows(
+            design(settings, name), settings.results, episodes=settings.evaluation.episodes, partial=parsed.partial
+        )
+        for name in TABLES
+    }
     tables = {name: table(rows[name], settings) for name, table in TABLES.items()}
     made = {"commit": commit(), **machine()}
     page = (parsed.output or Path("docs")) / "results.md"
@@ -217,6 +251,9 @@ def _report(parsed: argparse.Namespace) -> None:
     from mtcsirl.report.page import build_report
 
     settings = study_settings(parsed)
-    page = (parsed.output or Path(settings.results) / "report") / "index.html"
+    home = Path(settings.results) / "report"
+    page = (parsed.output or home) / "index.html"
     write_text(page, build_report(collect(settings, page, partial=parsed.partial)))
+    if not parsed.partial and page.parent.resolve() == home.resolve():
+        sign_artefact("report", settings, [page])
     print(page)

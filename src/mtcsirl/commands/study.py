@@ -52,6 +52,16 @@ def register(verbs: Verbs) -> None:
     status.add_argument("--cores", type=positive, default=2, metavar="N", help="cores for the time left; default 2")
     add_study_settings(status)
 
+    check = add_verb(
+        verbs,
+        "verify",
+        _verify,
+        does="check that every file of a results folder is what its run wrote, and say what to delete",
+        needs="a results folder",
+        writes="nothing",
+    )
+    check.add_argument("folder", type=Path, metavar="FOLDER", help="for example results")
+
     differences = add_verb(
         verbs,
         "deviations",
@@ -116,7 +126,7 @@ def _print_artefacts(settings: "Settings", rates: "Rates") -> None:
 
 def _status(parsed: argparse.Namespace) -> None:
     from mtcsirl.study.plan import load_rates
-    from mtcsirl.study.status import FAILED, RUNNING, STATES, seconds_left, study_status
+    from mtcsirl.study.status import FAILED, RUNNING, STALE, STATES, seconds_left, study_status
 
     settings = study_settings(parsed)
     statuses = study_status(design(settings, parsed.target), settings)
@@ -127,12 +137,24 @@ def _status(parsed: argparse.Namespace) -> None:
         counts = [sum(status.state == state for status in own) for state in STATES]
         lines.append((stage, *counts, f"{sum(gates)} of {len(gates)}" if gates else ""))
     _print_table(("stage", *STATES, "gates passed"), lines)
-    for state in (RUNNING, FAILED):
+    for state in (STALE, RUNNING, FAILED):
         for status in statuses:
             if status.state == state:
                 print(f"{state}: {status.run.folder}: {status.says}")
     left = seconds_left(statuses, settings, load_rates(), parsed.cores)
     print(f"\ntime left on {parsed.cores} cores: about {left / 3600:.1f} hours" if left else "\nall runs are done")
+
+
+def _verify(parsed: argparse.Namespace) -> None:
+    from mtcsirl.errors import UserError
+    from mtcsirl.study.verification import faults
+
+    found = list(faults(parsed.folder))
+    for fault in found:
+        print(f"delete {fault.path}: {fault.why}")
+    if found:
+        raise UserError(f"{parsed.folder}: {len(found)} faults; delete what is listed and make it again")
+    print(f"{parsed.folder}: every file is what its run wrote")
 
 
 def _print_table(head: tuple[str, ...], rows: Sequence[tuple[object, ...]]) -> None:

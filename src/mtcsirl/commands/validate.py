@@ -2,7 +2,7 @@
 
 import argparse
 
-from mtcsirl.commands.arguments import Verbs, add_output, add_verb, new_folder, positive
+from mtcsirl.commands.arguments import Verbs, add_output, add_verb, new_folder, path, positive
 from mtcsirl.commands.drawing import write_figure
 
 
@@ -18,6 +18,7 @@ def register(verbs: Verbs) -> None:
     )
     add_output(verb, "results/validation")
     verb.add_argument("--figures", type=new_folder, default="paper_figs", metavar="DIR", help="folder of the figure")
+    verb.add_argument("--results", type=path, metavar="DIR", help="results folder where to note what was made")
     verb.add_argument("--processes", type=positive, default=1, help="seeds that run at the same time")
 
 
@@ -31,4 +32,11 @@ def _validate(parsed: argparse.Namespace) -> None:
         write_csv(parsed.output / f"{name}.csv", frame)
     figure, text = draw(findings), caption(findings)
     write_figure(parsed.figures / "validation", figure, text)
+    if parsed.results is not None:
+        from mtcsirl.settings import Settings
+        from mtcsirl.study.artefacts import sign_artefact
+
+        drawn = [parsed.figures / f"validation.{ending}" for ending in ("pdf", "png")]
+        made = [parsed.output / f"{name}.csv" for name in findings._asdict()] + drawn
+        sign_artefact("validation", Settings(results=str(parsed.results)), made)
     print(text)

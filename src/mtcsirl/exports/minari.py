@@ -10,9 +10,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from mtcsirl.episodes.demonstrations import COLUMNS
+from mtcsirl.episodes.demonstrations import read_demonstrations
 from mtcsirl.errors import UserError
-from mtcsirl.files.storage import read_parquet
 from mtcsirl.worlds.environments import ACTION_SIZE, OBSERVATION_SIZE
 
 NAME = re.compile(r"([A-Za-z0-9_-]+/)*[A-Za-z0-9_-]+-v[0-9]+")
@@ -31,16 +30,14 @@ def export_minari(demonstrations: Path | str, folder: Path | str, name: str | No
     folder = Path(folder)
     if name is not None:
         _check_name(name)
-    frame = read_parquet(demonstrations, COLUMNS)
-    if frame.empty:
-        raise UserError(f"{demonstrations}: holds no transition; collect the demonstrations again")
+    frame = read_demonstrations(demonstrations)
     task, target = frame["task"].iloc[0], int(frame["target"].iloc[0])
     name = name or f"mtcsirl/{task}-t{target}-v0"
     if (folder / name).exists():
         raise UserError(f"{folder}: already holds {name}; choose another --name or delete it")
     folder.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix=".minari-", dir=folder) as place:
-        _write(Path(place), name, demonstrations, frame, task, target)
+        _write(Path(place), name, frame, task, target)
         for made in sorted(Path(place).rglob("namespace_metadata.json")):
             known = folder / made.relative_to(place)
             if not known.exists():
@@ -60,17 +57,14 @@ def _check_name(name: str) -> None:
         )
 
 
-def _write(root: Path, name: str, file: Path | str, frame: pd.DataFrame, task: str, target: int) -> None:
+def _write(root: Path, name: str, frame: pd.DataFrame, task: str, target: int) -> None:
     os.environ["MINARI_DATASETS_PATH"] = str(root.resolve())
     try:
         import minari
         from minari.data_collector import EpisodeBuffer
     except ImportError as error:
         raise UserError("Minari is not installed: pip install 'mtcsirl[export]'") from error
-    try:
-        buffers = [_episode(EpisodeBuffer, int(str(i)), steps) for i, steps in frame.groupby("episode", sort=True)]
-    except (ValueError, TypeError) as error:
-        raise UserError(f"{file}: not readable as demonstrations ({error}); collect them again") from error
+    buffers = [_episode(EpisodeBuffer, int(str(i)), steps) for i, steps in frame.groupby("episode", sort=True)]
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # it asks for an environment id and an address, which there are not
         _create(minari, name, buffers, task, target)

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
 from mtcsirl.errors import UserError
+from mtcsirl.files.identity import verify
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -43,6 +44,7 @@ def _read(path: Path | str, parse: Callable[[Path], Any], what: str) -> Any:
     path = Path(path)
     if not path.is_file():
         raise UserError(f"{path}: no such file; run the stage that makes it first")
+    verify(path)
     try:
         return parse(path)
     except UserError:
@@ -87,11 +89,23 @@ def read_json(path: Path | str) -> Any:
 def write_csv(path: Path | str, frame: "pd.DataFrame") -> None:
     """Write a tidy frame; floats with 9 significant digits, enough for float32."""
     with atomic(path) as handle:
-        frame.to_csv(handle, index=False, float_format="%.9g", lineterminator="\n")
+        render_csv(handle, frame)
+
+
+def render_csv(handle: IO[str], frame: "pd.DataFrame") -> None:
+    """Write a tidy frame into an open text file."""
+    frame.to_csv(handle, index=False, float_format="%.9g", lineterminator="\n")
+
+
+_NUMBERS = {"target", "seed", "episode", "step", "value", "low", "high", "n", "episodes"}
+"""Columns of tidy frames that hold numbers."""
 
 
 def read_csv(path: Path | str, columns: tuple[str, ...] = ()) -> "pd.DataFrame":
-    """Read a tidy frame and check that ``columns`` are there; empty cells of text columns stay empty strings."""
+    """Read a tidy frame and check that ``columns`` are there; empty cells of text columns stay empty strings.
+
+    A text in a column of numbers is an error that names both; an empty cell there is NaN.
+    """
     import pandas as pd
 
     names = ("task", "cs_reward", "method", "source", "experiment", "policy", "metric", "discriminator")
@@ -100,14 +114,19 @@ def read_csv(path: Path | str, columns: tuple[str, ...] = ()) -> "pd.DataFrame":
     def parse(p: Path) -> "pd.DataFrame":
         return pd.read_csv(p, dtype=text, keep_default_na=True).fillna(dict.fromkeys(text, ""))
 
-    frame = _read(path, parse, "CSV file")
-    return _with_columns(path, frame, columns)
+    frame = _with_columns(path, _read(path, parse, "CSV file"), columns)
+    for name in _NUMBERS & set(frame.columns):
+        if not pd.api.types.is_numeric_dtype(frame[name]):
+            texts = frame[name][pd.to_numeric(frame[name], errors="coerce").isna() & frame[name].notna()]
+            if len(texts):
+                raise UserError(f"{path}: column {name} holds {str(texts.iloc[0])[:40]!r}, not a number; make it again")
+    return frame
 
 
-def write_parquet(path: Path | str, frame: "pd.DataFrame") -> None:
-    """Write a frame as Parquet (zstd)."""
+def write_parquet(path: Path | str, frame: "pd.DataFrame", level: int | None = None) -> None:
+    """Write a frame as Parquet (zstd, at the library's level or ``level``)."""
     with atomic(path, "wb") as handle:
-        frame.to_parquet(handle, index=False, compression="zstd")
+        frame.to_parquet(handle, index=False, compression="zstd", compression_level=level)
 
 
 def read_parquet(path: Path | str, columns: tuple[str, ...] = ()) -> "pd.DataFrame":

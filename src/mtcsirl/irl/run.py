@@ -15,7 +15,8 @@ import torch
 from torch import Tensor
 
 from mtcsirl.episodes.demonstrations import load_demonstrations
-from mtcsirl.episodes.evaluation import COLUMNS, evaluate, gate_verdict, measure_episode, stochastic_means
+from mtcsirl.episodes.evaluation import COLUMNS, evaluate, measure_episode
+from mtcsirl.episodes.gates import gate_verdict, stochastic_means
 from mtcsirl.episodes.lockstep import make_environments
 from mtcsirl.episodes.policy import Policy, save_policy
 from mtcsirl.errors import UserError
@@ -77,7 +78,8 @@ def make_trainer(
     if cs_reward not in COMMON_SENSE_REWARDS:
         raise UserError(f"cs_reward: unknown {cs_reward!r}; known: {', '.join(COMMON_SENSE_REWARDS)}")
     observation = settings.environment.observation
-    experts = load_demonstrations(demonstrations, episodes=settings.demonstration_episodes, observation=observation)
+    episodes = settings.demonstration_episodes
+    experts = load_demonstrations(demonstrations, episodes=episodes, observation=observation, cs_reward=cs_reward)
     world = World(
         members=experts.members,
         environments=make_environments(experts.members, settings.environment),
@@ -177,6 +179,7 @@ def _evaluate(trainer: IrlTrainer, folder: Path, cs_reward: str, seed: int) -> N
             "success": float(np.mean([verdict["success"] for verdict in verdicts])),
             "metric": float(np.mean([verdict["metric"] for verdict in verdicts])),
             "limits": verdicts[0]["limits"],
+            "diverged": sum(verdict["diverged"] for verdict in verdicts),
             "members": verdicts,
         },
     )

@@ -4,7 +4,8 @@
 status. No row is dropped: a run that the study asks for and that is not there stands in the frame with value NaN.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -13,28 +14,35 @@ import pandas as pd
 
 from mtcsirl.errors import UserError
 from mtcsirl.files import storage
-from mtcsirl.names import CS_REWARDS
+from mtcsirl.names import CS_REWARDS, DIVERGED, KEPT, LAST, distance_metric
 from mtcsirl.study.runs import Baseline, Demonstrations, Expert, IrlRun, Run, Study, Transfer
 
 KEY = ("stage", "experiment", "method", "cs_reward", "source", "task", "target", "seed")
-ROW_COLUMNS = (*KEY, "policy", "metric", "value", "episodes", "status", "folder")
+ROW_COLUMNS = (*KEY, "policy", "kept", "metric", "value", "episodes", "diverged", "status", "lacks", "folder")
 CURVE_COLUMNS = (*KEY, "step", "metric", "value")
 RUN_KEY = ("experiment", "method", "cs_reward", "source", "seed")
 SCORE_COLUMNS = (*RUN_KEY, "transitions", "reward", "statistic", "value", "low", "high", "n")
-POINT_COLUMNS = (*RUN_KEY, "transitions", "episode", "truth", "learned", "task_reward")
-EVALUATION_COLUMNS = ("task", "target", "seed", "policy", "episode", "metric", "value")
+POINT_COLUMNS = (*RUN_KEY, "transitions", "agent", "episode", "truth", "learned", "task_reward", "random")
+EVALUATION_COLUMNS = ("task", "target", "seed", "policy", "kept", "episode", "metric", "value")
 
-OK, BELOW_GATE, MISSING, DUPLICATED, FOREIGN = "ok", "below gate", "missing", "duplicated", "foreign"
+OK, BELOW_GATE, MISSING, DUPLICATED, FOREIGN, INCOMPLETE = (
+    "ok", "below gate", "missing", "duplicated", "foreign", "incomplete"
+)  # fmt: skip
 """Status of a run. Below gate: the agent did not learn what it had to; its value counts and is marked. Missing: no
 evaluation. Duplicated: the numbers of another seed, or an episode twice. Foreign: the file names another task, target
-or seed than its folder. The last three have the value NaN."""
+or seed than its folder. Incomplete: not the episodes, policies and metrics that the settings ask for, or values
+that are no numbers; ``lacks`` says which. The last four have the value NaN: nothing is averaged over the rest."""
 
 POLICIES = ("stochastic", "deterministic")
 
 
-def evaluation_rows(study: Study, results: Path | str, *, partial: bool = False) -> pd.DataFrame:
+def evaluation_rows(
+    study: Study, results: Path | str, *, episodes: int, partial: bool = False, kept: str = KEPT
+) -> pd.DataFrame:
     """Every agent of ``study`` with its evaluation, ``ROW_COLUMNS``; agents are run x member for IRL runs.
 
+    ``episodes``: how many of each policy the settings ask for. ``diverged``: in how many of them the simulation
+    diverged; they count as failed. ``kept``: the policy that each run leaves behind; see ``last_rows`` for the other.
     Demonstrations are rows too, of the stage ``collect_demonstrations`` with the seed of their expert: what their
     episodes reached and whether that passes the expert's gate.
 
@@ -43,22 +51,33 @@ def evaluation_rows(study: Study, results: Path | str, *, partial: bool = False)
     """
     frames = []
     for run in study:
+        if kept == LAST and not isinstance(run, Expert | Baseline):
+            continue
         for agent in agents(run):
             folder = Path(results) / run.folder
             if not (folder / "evaluation.csv").is_file():
                 _demand(folder / "evaluation.csv", partial)
-            frames.append(_agent_rows(agent, folder, metrics(study)))
-    frames += [_demonstration_rows(run, Path(results) / run.folder, partial) for run in study.demonstrations]
+            frames.append(_agent_rows(agent, folder, metrics(study), episodes, kept))
+    if kept == KEPT:
+        frames += [_demonstration_rows(run, Path(results) / run.folder, partial) for run in study.demonstrations]
     rows = pd.concat(frames, ignore_index=True) if frames else pd.DataFrame({name: [] for name in ROW_COLUMNS})
     return _mark_equal_seeds(rows[list(ROW_COLUMNS)])
 
 
-def ablated_generators(study: Study, results: Path | str, experiment: str) -> pd.DataFrame:
+def last_rows(study: Study, results: Path | str, *, episodes: int, partial: bool = False) -> pd.DataFrame:
+    """``evaluation_rows`` of the last policies of experts and SAC, which keep their best; new agents keep their last.
+
+    No gate is asked of them: their status is never "below gate".
+    """
+    return evaluation_rows(study, results, episodes=episodes, partial=partial, kept=LAST)
+
+
+def ablated_generators(study: Study, results: Path | str, experiment: str, *, episodes: int) -> pd.DataFrame:
     """The generators of a variant, with the name of its ablation as their experiment; runs that are not there: none.
 
     A variant has the keys of the main study's runs: without a name of their own they would be taken for those.
     """
-    rows = evaluation_rows(study, results, partial=True)
+    rows = evaluation_rows(study, results, episodes=episodes, partial=True)
     return select(rows, stage="learn_reward").assign(experiment=experiment)
 
 
@@ -90,12 +109,15 @@ def point_rows(study: Study, results: Path | str, *, partial: bool = False) -> p
 
 
 def _of_scores(study: Study, results: Path | str, name: str, columns: tuple[str, ...], partial: bool) -> pd.DataFrame:
+    read = storage.read_parquet if name.endswith("parquet") else storage.read_csv
+    own = (*RUN_KEY, "task")
     frames = []
     for run in study.scores:
         path = Path(results) / run.folder / name
         if _present(path, partial):
-            frame = storage.read_parquet(path) if name.endswith("parquet") else storage.read_csv(path)
-            frames.append(frame.assign(**{key: getattr(run.irl, key) for key in RUN_KEY}, task=run.task))
+            key = {part: getattr(run.irl, part) for part in RUN_KEY} | {"task": run.task}
+            frame = read(path, tuple(column for column in columns if column not in own))
+            frames.append(frame.assign(**key))
     return _joined(frames, columns)
 
 
@@ -147,26 +169,51 @@ def run_key(run: Run) -> dict[str, Any]:
 
 
 def metrics(study: Study) -> tuple[str, ...]:
-    """What an evaluation measures: the paper's two cs-rewards, further ones of this study, success, task reward."""
+    """What is read of an evaluation: success, mean and distance of cs-rewards, task reward.
+
+    The cs-rewards are the paper's two and further ones of this study.
+    """
     used = dict.fromkeys((*CS_REWARDS, *(x.cs_reward for x in study.experts), *(x.cs_reward for x in study.irl_runs)))
-    return ("success", *used, "task_reward")
+    return ("success", *used, *(distance_metric(name) for name in used), "task_reward")
 
 
-def _agent_rows(agent: dict[str, Any], folder: Path, names: tuple[str, ...]) -> pd.DataFrame:
+def _agent_rows(agent: dict[str, Any], folder: Path, names: tuple[str, ...], asked: int, kept: str) -> pd.DataFrame:
     """One row per policy and metric of one agent."""
     grid = pd.MultiIndex.from_product([POLICIES, names], names=["policy", "metric"])
-    rows = pd.DataFrame({"value": np.nan, "episodes": 0}, index=grid)
-    status = MISSING
+    rows = pd.DataFrame({"value": np.nan, "episodes": 0, "diverged": 0}, index=grid)
+    status, lacks = MISSING, ""
     path = folder / "evaluation.csv"
     if path.is_file():
         episodes = storage.read_csv(path, EVALUATION_COLUMNS)
         own = episodes[(episodes["task"] == agent["task"]) & (episodes["target"] == agent["target"])]
-        status = _status(agent, own, folder)
-        groups = own.groupby(["policy", "metric"])["value"]
+        chosen = own[own["kept"] == kept]
+        lacks = what_lacks(chosen, (*names, DIVERGED), asked)
+        status, lacks = _status(agent, own, lacks if len(own) or episodes.empty else "", folder, kept)
+        groups = chosen.groupby(["policy", "metric"])["value"]
         rows["episodes"] = groups.size().reindex(grid, fill_value=0)
         if status in (OK, BELOW_GATE):
             rows["value"] = groups.mean().reindex(grid)
-    return rows.reset_index().assign(**agent, status=status, folder=str(folder))
+            diverged = {policy: int(groups.get_group((policy, DIVERGED)).sum()) for policy in POLICIES}
+            rows["diverged"] = rows.index.get_level_values("policy").map(diverged)
+    return rows.reset_index().assign(**agent, kept=kept, status=status, lacks=lacks, folder=str(folder))
+
+
+def what_lacks(rows: pd.DataFrame, names: Sequence[str], asked: int) -> str:
+    """What the episodes of one agent lack of ``asked`` whole ones of each policy, each with the metrics ``names``.
+
+    "" if nothing: every policy and metric has exactly the episodes 0 to ``asked`` - 1, and all values are finite.
+    """
+    needed = rows[rows["metric"].isin(names) & rows["policy"].isin(POLICIES)]
+    cells = set(zip(needed["policy"], needed["metric"], needed["episode"], strict=True))
+    wanted = set(product(POLICIES, names, range(asked)))
+    if cells != wanted:
+        policy, metric, _ = min(cells ^ wanted)
+        found = sum(cell[:2] == (policy, metric) for cell in cells)
+        return f"{policy} {metric}: {found} of {asked} episodes"
+    broken = needed[~np.isfinite(needed["value"].to_numpy(dtype=float))]
+    for policy, metric, episode in broken[["policy", "metric", "episode"]].itertuples(index=False):
+        return f"{policy} {metric}: episode {int(episode)} has no number"
+    return ""
 
 
 def _demonstration_rows(run: Demonstrations, folder: Path, partial: bool) -> pd.DataFrame:
@@ -174,26 +221,54 @@ def _demonstration_rows(run: Demonstrations, folder: Path, partial: bool) -> pd.
     verdict: dict[str, Any] = {"success": np.nan, "metric": np.nan}
     status = MISSING
     if _present(folder / "gate.json", partial):
-        verdict = storage.read_json(folder / "gate.json")
+        verdict = _verdict(folder / "gate.json")
         status = OK if verdict["passed"] else BELOW_GATE
     key = run_key(run) | {"task": run.task, "target": run.target, "seed": run.expert.seed}
     rows = pd.DataFrame(
-        {"policy": "stochastic", "metric": ["success", run.cs_reward], "value": [verdict["success"], verdict["metric"]]}
+        {
+            "policy": "stochastic",
+            "metric": ["success", run.cs_reward],
+            "value": np.array([verdict["success"], verdict["metric"]], dtype=float),  # None, which is no number: NaN
+        }
     )
-    return rows.assign(**key, episodes=0, status=status, folder=str(folder))
+    marks: dict[str, Any] = {"episodes": 0, "diverged": int(verdict.get("diverged", 0)), "status": status, "lacks": ""}
+    return rows.assign(**key, **marks, kept=KEPT, folder=str(folder))
 
 
-def _status(agent: dict[str, Any], own: pd.DataFrame, folder: Path) -> str:
-    if own.empty or (own["seed"] != agent["seed"]).any():
-        return FOREIGN
-    if own.duplicated(["policy", "episode", "metric"]).any():
-        return DUPLICATED
+def _status(agent: dict[str, Any], own: pd.DataFrame, lacks: str, folder: Path, kept: str) -> tuple[str, str]:
+    """The status of an agent with its rows ``own``, of whatever policy, and what it lacks if it is incomplete."""
+    if own.empty and not lacks:
+        return FOREIGN, ""
+    if (own["seed"] != agent["seed"]).any():
+        return FOREIGN, ""
+    if own.duplicated(["policy", "kept", "episode", "metric"]).any():
+        return DUPLICATED, ""
+    if lacks:
+        return INCOMPLETE, lacks
+    if kept != KEPT:
+        return OK, ""
     gate = folder / "gate.json"
-    if gate.is_file():
-        verdict = storage.read_json(gate)
-        members = {(m["task"], m["target"]): m for m in verdict.get("members", [])}
-        return OK if members.get((agent["task"], agent["target"]), verdict)["passed"] else BELOW_GATE
-    return OK
+    if not gate.is_file():
+        return INCOMPLETE, "gate.json"
+    return (OK if _passed(gate, agent) else BELOW_GATE), ""
+
+
+def _passed(gate: Path, agent: dict[str, Any]) -> bool:
+    """Whether an agent passed, by the ``gate.json`` of its run.
+
+    Raises:
+        UserError: the file is no gate's.
+    """
+    verdict = _verdict(gate)
+    members = {(m.get("task"), m.get("target")): m for m in verdict.get("members", [])}
+    return bool(members.get((agent["task"], agent["target"]), verdict)["passed"])
+
+
+def _verdict(gate: Path) -> dict[str, Any]:
+    verdict = storage.read_json(gate)
+    if not isinstance(verdict, dict) or not {"passed", "success", "metric"} <= set(verdict):
+        raise UserError(f"{gate}: not the verdict of a gate; delete it and make its run again")
+    return verdict
 
 
 def _mark_equal_seeds(rows: pd.DataFrame) -> pd.DataFrame:

@@ -20,7 +20,7 @@ from mtcsirl.names import (
 from mtcsirl.rewards.ground_truth import COMMON_SENSE_REWARDS
 from mtcsirl.settings.base import Frozen, key
 from mtcsirl.settings.budgets import Budget, Iterations, Shares, Task
-from mtcsirl.settings.irl import GeneratorSettings, IrlAlgorithmSettings, ScoreSettings, TransferSettings
+from mtcsirl.settings.irl import GeneratorSettings, IrlUpdateSettings, ScoreSettings, TransferSettings
 from mtcsirl.settings.learner import (
     EnvironmentSettings,
     EvaluationSettings,
@@ -211,7 +211,7 @@ class DemonstrationSettings(Frozen):
     )
 
 
-class IrlStudySettings(IrlAlgorithmSettings, GeneratorSettings):
+class IrlStudySettings(IrlUpdateSettings, GeneratorSettings):
     """Inverse reinforcement learning."""
 
     warm_up_iterations: Iterations = key(

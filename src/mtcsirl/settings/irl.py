@@ -4,7 +4,9 @@ from typing import Literal
 
 from pydantic import Field
 
+from mtcsirl.names import EXPERIMENTS
 from mtcsirl.settings.base import Frozen, key
+from mtcsirl.settings.budgets import Updates
 from mtcsirl.settings.learner import RewardScaleSettings, Sizes, Temperature
 
 
@@ -31,7 +33,7 @@ class DiscriminatorSettings(Frozen):
 
 
 class IrlAlgorithmSettings(Frozen):
-    """Algorithms 1 and 2; how long generators warm up is a matter of their tasks."""
+    """Algorithms 1 and 2 but for what depends on tasks (the warm-up) or on the experiment (updates)."""
 
     iterations: int = key(120, "N: outer iterations after the warm-up", unit="iterations", gt=0)
     steps_per_iteration: int = key(
@@ -41,8 +43,6 @@ class IrlAlgorithmSettings(Frozen):
         paper=500,
         gt=0,
     )
-    discriminator_updates: int = key(40, "D_updates per task and iteration", unit="updates", paper=15, gt=0)
-    generator_updates: int = key(250, "G_updates per task and iteration", unit="updates", paper=15, gt=0)
     generator_replay: int = key(
         20,
         "generator samples come from the last this many iterations; 1 = latest rollout",
@@ -128,9 +128,36 @@ class GeneratorSettings(Frozen):
         )
 
 
+class IrlUpdateSettings(IrlAlgorithmSettings):
+    """Algorithms 1 and 2 with the updates of each experiment, as the configuration has them."""
+
+    discriminator_updates: Updates = key(
+        lambda: dict.fromkeys(EXPERIMENTS, 40),
+        "D_updates per task and iteration, by experiment",
+        unit="updates",
+        paper={"single_target": 15, "multi_target": 15, "multi_task": 10},
+    )
+    generator_updates: Updates = key(
+        lambda: dict.fromkeys(EXPERIMENTS, 250),
+        "G_updates per task and iteration, by experiment",
+        unit="updates",
+        paper={"single_target": 15, "multi_target": 15, "multi_task": 20},
+    )
+    discriminator_update: Literal["gradient_step", "epoch"] = key(
+        "gradient_step", "one of D_updates: one gradient step, or as many as an epoch has steps (steps_per_iteration)"
+    )
+    generator_update: Literal["gradient_step", "epoch"] = key(
+        "gradient_step",
+        "one of G_updates: one gradient step; or an epoch as SAC has them: steps_per_iteration environment steps and as"
+        " many gradient steps, so that an iteration collects G_updates times as much",
+    )
+
+
 class IrlSettings(IrlAlgorithmSettings):
     """Algorithms 1 and 2 as one run has them."""
 
+    discriminator_updates: int = Field(default=40, gt=0, description="gradient steps per task and iteration")
+    generator_updates: int = Field(default=250, gt=0, description="gradient steps per task and iteration")
     warm_up_iterations: int = Field(default=0, ge=0, description="that of the run's slowest task")
 
 

@@ -115,7 +115,9 @@ class GateSettings(Frozen):
 class ProgressSettings(Frozen):
     """How a training job reports, saves and selects."""
 
-    checkpoint_every: int = key(20_000, "distance of two resume checkpoints", unit="environment steps", gt=0)
+    checkpoint_every: int = key(
+        20_000, "distance of two resume checkpoints", unit="environment steps", neutral=True, gt=0
+    )
     select_every: int = key(
         5_000,
         "distance of two trials of the policy for the best one by the gate",
@@ -129,4 +131,4 @@ class ProgressSettings(Frozen):
         unit="episodes",
         ge=0,
     )
-    tensorboard: bool = key(False, "write TensorBoard event files beside curve.csv")
+    tensorboard: bool = key(False, "write TensorBoard event files beside curve.csv", neutral=True)

@@ -136,12 +136,11 @@ def transfer_run(settings: Settings, task: str) -> AgentRunSettings:
     return sliced(run, unread("transfer"))
 
 
-def demonstration_run(settings: Settings, experiments: tuple[str, ...] = ("multi_target",)) -> DemonstrationRunSettings:
-    """The settings of one expert's demonstrations: as many episodes as the hungriest of ``experiments`` reads."""
-    episodes = max(settings.demonstrations.episodes[name] for name in experiments)  # type: ignore[index]
+def demonstration_run(settings: Settings) -> DemonstrationRunSettings:
+    """The settings of one expert's demonstrations: as many episodes as the hungriest experiment reads."""
     run = DemonstrationRunSettings(
         environment=settings.environment,
-        episodes=episodes,
+        episodes=max(settings.demonstrations.episodes.values()),
         episode_steps=settings.evaluation.episode_steps,
         gates=settings.gates,
     )
@@ -154,7 +153,7 @@ def irl_run(settings: Settings, experiment: str, tasks: Collection[str], method:
     run = IrlRunSettings(
         environment=settings.environment,
         sac=settings.irl.scaling().sac(settings.sac),
-        irl=_irl(settings, tasks),
+        irl=_irl(settings, experiment, tasks),
         scripted_steps=scripted,
         scripted_noise=settings.exploration.scripted_noise if scripted else 0.0,
         demonstration_episodes=settings.demonstrations.episodes[experiment],  # type: ignore[index]
@@ -165,11 +164,24 @@ def irl_run(settings: Settings, experiment: str, tasks: Collection[str], method:
     return sliced(run, unread("learn_reward", method=method))
 
 
-def _irl(settings: Settings, tasks: Collection[str]) -> IrlSettings:
-    """The algorithm with the warm-up of the slowest of ``tasks``: generators go through it together."""
-    study = settings.irl
+def _irl(settings: Settings, experiment: str, tasks: Collection[str]) -> IrlSettings:
+    """The algorithm as ``experiment`` has it, with the warm-up of the slowest of ``tasks``: all go through it together.
+
+    Updates become gradient steps. An epoch is ``steps_per_iteration`` environment steps with one gradient step each;
+    with G_updates counted in epochs an iteration collects that many of them, and so does each discriminator's turn see
+    that many trajectories.
+    """
+    study, epoch = settings.irl, settings.irl.steps_per_iteration
     shared = {name: getattr(study, name) for name in IrlAlgorithmSettings.model_fields}
-    return IrlSettings(**shared, warm_up_iterations=max(granted(study.warm_up_iterations, task) for task in tasks))
+    discriminator, generator = study.discriminator_updates[experiment], study.generator_updates[experiment]
+    in_epochs = study.generator_update == "epoch"
+    own = {
+        "steps_per_iteration": epoch * generator if in_epochs else epoch,
+        "discriminator_updates": discriminator * (epoch if study.discriminator_update == "epoch" else 1),
+        "generator_updates": generator * (epoch if in_epochs else 1),
+        "warm_up_iterations": max(granted(study.warm_up_iterations, task) for task in tasks),
+    }
+    return IrlSettings(**{**shared, **own})
 
 
 def score_run(settings: Settings) -> ScoreRunSettings:

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from mtcsirl.results.rows import BELOW_GATE, DUPLICATED, FOREIGN, MISSING, matrix, select
+from mtcsirl.results.rows import BELOW_GATE, DUPLICATED, FOREIGN, INCOMPLETE, MISSING, matrix, select
 from mtcsirl.results.statistics import (
     UNKNOWN,
     Estimate,
@@ -28,7 +28,7 @@ MARKS = {"below": "†", "missing": "‡", "doubtful": "§"}
 MARK_TEXTS = {
     "below": "† agents below their gate; they count in the mean",
     "missing": "‡ missing agents",
-    "doubtful": "§ agents left out: the evaluation repeats another seed's, or names another run than its folder",
+    "doubtful": "§ agents left out: their evaluation is incomplete, or another seed's or run's",
 }
 
 
@@ -122,7 +122,7 @@ def make_cell(rows: pd.DataFrame, metric: str, paper: Summary, scale: float = 1.
         expected=chosen["seed"].nunique(),
         below=int((status == BELOW_GATE).sum()),
         missing=int((status == MISSING).sum()),
-        doubtful=int(status.isin([DUPLICATED, FOREIGN]).sum()),
+        doubtful=int(status.isin([DUPLICATED, FOREIGN, INCOMPLETE]).sum()),
     )
 
 
