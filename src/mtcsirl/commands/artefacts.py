@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 from mtcsirl.commands.arguments import Verbs, add_study_settings, add_verb, new_folder, study_settings
 from mtcsirl.commands.drawing import write_figure
+from mtcsirl.commands.remedy import Verb, advised
 from mtcsirl.settings import Settings
 from mtcsirl.study.ablations import ABLATIONS
 from mtcsirl.study.artefacts import HEAT_MAPS, sign_artefact, unsign_artefact
@@ -56,12 +57,12 @@ def register(verbs: Verbs) -> None:
 
 
 def _add(
-    verbs: Verbs, name: str, run: object, *, does: str, writes: str, numbered: bool = False
+    verbs: Verbs, name: str, run: Verb, *, does: str, writes: str, numbered: bool = False
 ) -> argparse.ArgumentParser:
     verb = add_verb(
         verbs,
         name,
-        run,  # type: ignore[arg-type]
+        advised(run, _target),
         does=does,
         needs="the study's runs in its results folder; with --partial those that are there",
         writes=f"{writes} into --output",
@@ -73,6 +74,13 @@ def _add(
     add_study_settings(verb)
     verb.add_argument("--output", type=new_folder, metavar="DIR", help="default: where the DAG puts it")
     return verb
+
+
+def _target(parsed: argparse.Namespace) -> str:
+    """What Snakemake calls what this verb makes."""
+    if "number" in parsed:
+        return f"{parsed.verb}_{parsed.number}"
+    return str(parsed.name) if "name" in parsed else {"results": "all"}.get(parsed.verb, parsed.verb.replace("-", "_"))
 
 
 def _table(parsed: argparse.Namespace) -> None:

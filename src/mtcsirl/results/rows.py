@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from mtcsirl.errors import UserError
+from mtcsirl.errors import MissingError, UserError
 from mtcsirl.files import storage
 from mtcsirl.names import CS_REWARDS, DIVERGED, KEPT, LAST, distance_metric
 from mtcsirl.study.runs import Baseline, Demonstrations, Expert, IrlRun, Run, Study, Transfer
@@ -296,6 +296,4 @@ def _present(path: Path, partial: bool) -> bool:
 
 def _demand(path: Path, partial: bool) -> None:
     if not partial:
-        raise UserError(
-            f"{path}: this run is missing; make it with `snakemake --cores 1 {path}`, or ask for --partial results"
-        )
+        raise MissingError(f"{path}: this run is missing")
