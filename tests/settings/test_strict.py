@@ -76,7 +76,7 @@ def test_what_yaml_and_reader_agree_on_is_read(checkout: Path) -> None:
 
 
 def _snakemake(checkout: Path, folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
-    command = ["snakemake", "--snakefile", str(checkout / "Snakefile"), "--cores", "1", "--dry-run", "--quiet", "all"]
+    command = ["snakemake", "--snakefile", str(checkout / "Snakefile"), "--quiet", "all", "--dry-run", "--cores", "1"]
     return subprocess.run(
         [sys.executable, "-m", *command, *arguments], cwd=folder, capture_output=True, text=True, check=False
     )
