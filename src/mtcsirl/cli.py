@@ -63,11 +63,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 130
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-    except OSError as error:
-        if error.strerror is None:
-            raise
-        print(f"mtcsirl: {error.filename or 'writing'}: {error.strerror}", file=sys.stderr)
-        return 2
     return 0
 
 

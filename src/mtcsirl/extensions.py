@@ -1,7 +1,7 @@
 """The registry of IRL methods, and Python files outside the package that add to it or to that of the cs-rewards.
 
-A method of the package is the function ``<name>`` of ``irl/methods/<name>.py``, imported when it is built, so that a
-configuration can be checked against the registry without torch.
+A configuration is checked against the registry of methods without torch, so those of the package stand here by name
+alone; ``irl/methods`` puts in what builds them.
 
 The configuration lists them (``extensions``); whoever validates it loads them first. A job of the DAG learns of them by
 the environment variable ``MTCSIRL_EXTENSIONS``, which the Snakefile sets, since its command line names what they add.
@@ -13,30 +13,25 @@ import importlib.util
 import os
 import sys
 from collections.abc import Callable, Iterable
-from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
 from mtcsirl import names
 from mtcsirl.errors import UserError
-
-if TYPE_CHECKING:
-    from mtcsirl.irl.discriminator import Method
-    from mtcsirl.irl.methods.base import Setup
 
 VARIABLE = "MTCSIRL_EXTENSIONS"
 MODULE_PREFIX = "mtcsirl_extension_"
 
 
-def _builder(name: str) -> Callable[[Setup], Method]:
-    def build(setup: Setup) -> Method:
-        method: Method = getattr(import_module(f"mtcsirl.irl.methods.{name}"), name)(setup)
-        return method
-
-    return build
+Builder = Callable[[Any], Any]
+"""From a ``Setup`` to a ``Method``; both are of ``irl``, which stands above this module."""
 
 
-METHODS: dict[str, Callable[[Setup], Method]] = {name: _builder(name) for name in names.METHODS}
+def _by_name_alone(setup: Any) -> Any:
+    raise RuntimeError("take METHODS from mtcsirl.irl.methods, which can build them")
+
+
+METHODS: dict[str, Builder] = dict.fromkeys(names.METHODS, _by_name_alone)
 """Every method by name, and what builds it."""
 
 

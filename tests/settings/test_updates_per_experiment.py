@@ -29,9 +29,11 @@ def test_paper_scale_has_the_published_number_of_each_experiment(checkout: Path,
 
 def test_one_number_for_all_experiments_deviates_from_the_paper() -> None:
     """15 and 15 everywhere was taken for the paper's once; its several tasks have 10 and 20."""
-    settings = load(scale="paper", overrides=["irl.discriminator_updates.multi_task=15"])
+    settings = load(scale="paper", overrides=["irl.discriminator_updates.multi_task=15", "scale=desk"])
     (deviation,) = deviations(settings)
     assert deviation.key == "irl.discriminator_updates"
+    with pytest.raises(UserError, match=r"scale = 'paper', but irl\.discriminator_updates = "):
+        load(scale="paper", overrides=["irl.discriminator_updates.multi_task=15"])
     assert "multi_task: 15} updates (paper: {single_target: 15, multi_target: 15, multi_task: 10})" in str(deviation)
 
 

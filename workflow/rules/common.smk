@@ -14,7 +14,7 @@ from snakemake.exceptions import WorkflowError
 from mtcsirl.errors import UserError
 from mtcsirl.extensions import VARIABLE
 from mtcsirl.files.identity import marker
-from mtcsirl.names import TASKS
+from mtcsirl.names import EXPERIMENTS, TASKS
 from mtcsirl.settings.loading import configured, read_yaml
 from mtcsirl.settings.machine import check_study
 from mtcsirl.settings.template import as_json
@@ -60,7 +60,7 @@ wildcard_constraints:
     **FIELDS,
     cs_reward="|".join(SETTINGS.cs_rewards),
     method="|".join({*SETTINGS.methods, "mt_csirl"}),
-    experiment="single_target|multi_target|multi_task",
+    experiment="|".join(EXPERIMENTS),
     task="|".join(TASKS),
     source="|".join((*TASKS, "all")),
     identity="[0-9a-f]{16}",

@@ -8,8 +8,8 @@ from typing import Any, TypeVar
 from pydantic import BaseModel
 
 from mtcsirl.errors import UserError
-from mtcsirl.files.writable import check_file, check_folder
-from mtcsirl.names import EXPERIMENTS, HIGHEST_SEED, HIGHEST_TARGET_SEED, TARGETS_PER_TASK, TASKS
+from mtcsirl.files.storage import check_writable
+from mtcsirl.names import HIGHEST_SEED, HIGHEST_TARGET_SEED, TARGETS_PER_TASK, TASKS
 from mtcsirl.settings import Settings
 from mtcsirl.settings.loading import configured, load, override, read_yaml, validate
 from mtcsirl.settings.machine import check_agent, check_irl
@@ -35,7 +35,7 @@ def add_verb(
         formatter_class=argparse.RawDescriptionHelpFormatter,
         description=f"{does[0].upper()}{does[1:]}.\n\nneeds:  {needs}\nwrites: {writes}",
     )
-    verb.set_defaults(run=run)
+    verb.set_defaults(run=run, verb=name)
     return verb
 
 
@@ -107,12 +107,7 @@ def add_cs_reward(verb: argparse.ArgumentParser) -> None:
 def add_output(verb: argparse.ArgumentParser, default: str | None = None) -> None:
     """``--output``."""
     verb.add_argument(
-        "--output",
-        required=default is None,
-        default=default,
-        type=folder_to_write,
-        metavar="DIR",
-        help="folder to write to",
+        "--output", required=default is None, default=default, type=new_folder, metavar="DIR", help="folder to write to"
     )
 
 
@@ -144,6 +139,22 @@ def target(text: str) -> int:
     if not text.isdecimal() or int(text) >= TARGETS_PER_TASK:
         raise argparse.ArgumentTypeError(f"target {text!r}: must be 0 ... {TARGETS_PER_TASK - 1}")
     return int(text)
+
+
+def new_folder(text: str) -> Path:
+    """A folder that can be written, or made."""
+    return _writable(text, folder=True)
+
+
+def new_file(text: str) -> Path:
+    """A file that can be written."""
+    return _writable(text, folder=False)
+
+
+def _writable(text: str, *, folder: bool) -> Path:
+    place = path(text)
+    check_writable(place, folder=folder)
+    return place
 
 
 def natural(text: str) -> int:
@@ -183,20 +194,6 @@ def text(given: str) -> str:
 def path(given: str) -> Path:
     """A path that is not empty: that would be the working folder."""
     return Path(text(given))
-
-
-def folder_to_write(given: str) -> Path:
-    """A folder that can be written, there or not."""
-    folder = path(given)
-    check_folder(folder)
-    return folder
-
-
-def file_to_write(given: str) -> Path:
-    """A file that can be written, there or not."""
-    file = path(given)
-    check_file(file)
-    return file
 
 
 def cs_reward(name: str) -> str:
@@ -252,14 +249,11 @@ def refuse_folder_of_others(folder: Path, stage: str = "") -> None:
         raise UserError(f"{folder}: holds another run ({found[0]}); choose a folder of its own")
 
 
-def chosen_experiment(asked: str | None, members: Sequence[tuple[str, int]]) -> str:
-    """The experiment of an IRL run on these tasks and targets; UserError where ``asked`` contradicts them."""
-    tasks = len({task for task, _ in members})
-    found = EXPERIMENTS[2] if tasks > 1 else EXPERIMENTS[1] if len(members) > 1 else EXPERIMENTS[0]
+def check_experiment(asked: str | None, found: str, members: Sequence[tuple[str, int]]) -> None:
+    """Raise UserError where the experiment ``asked`` for is not what the tasks and targets of the run make it."""
     if asked not in (None, found):
-        targets = f"{len(members)} targets of {tasks} task{'s' if tasks > 1 else ''}"
-        raise UserError(f"--experiment {asked}: the demonstrations are of {targets}, which is {found}")
-    return found
+        names = ", ".join(f"{task}-t{target}" for task, target in members)
+        raise UserError(f"--experiment {asked}: the demonstrations are of {names}, which is {found}")
 
 
 def study_settings(parsed: argparse.Namespace) -> Settings:

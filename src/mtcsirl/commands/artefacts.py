@@ -1,12 +1,12 @@
 """The verbs that read a study's results: tables, figures, claims, results page, report."""
 
 import argparse
-from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
-from mtcsirl.commands.arguments import Verbs, add_study_settings, add_verb, folder_to_write, study_settings
+from mtcsirl.commands.arguments import Verbs, add_study_settings, add_verb, new_folder, study_settings
 from mtcsirl.commands.drawing import write_figure
+from mtcsirl.commands.remedy import Verb, advised
 from mtcsirl.settings import Settings
 from mtcsirl.study.ablations import ABLATIONS
 from mtcsirl.study.artefacts import HEAT_MAPS, sign_artefact, unsign_artefact
@@ -37,7 +37,7 @@ def register(verbs: Verbs) -> None:
         verbs, "ablation", _ablation, does="draw an ablation", writes="NAME.csv; NAME.pdf, .png into --figures"
     )
     ablation.add_argument("name", choices=tuple(ABLATIONS), metavar="NAME", help=", ".join(ABLATIONS))
-    ablation.add_argument("--figures", type=folder_to_write, metavar="DIR", help="default: where the DAG puts it")
+    ablation.add_argument("--figures", type=new_folder, metavar="DIR", help="default: where the DAG puts it")
     _add(
         verbs,
         "reward-quality",
@@ -58,18 +58,12 @@ def register(verbs: Verbs) -> None:
 
 
 def _add(
-    verbs: Verbs,
-    name: str,
-    run: Callable[[argparse.Namespace], None],
-    *,
-    does: str,
-    writes: str,
-    numbered: bool = False,
+    verbs: Verbs, name: str, run: Verb, *, does: str, writes: str, numbered: bool = False
 ) -> argparse.ArgumentParser:
     verb = add_verb(
         verbs,
         name,
-        run,
+        advised(run, _target),
         does=does,
         needs="the study's runs in its results folder; with --partial those that are there",
         writes=f"{writes} into --output",
@@ -79,8 +73,15 @@ def _add(
         verb.add_argument("number", choices=numbers, metavar="N", help=f"as in the paper: {', '.join(numbers)}")
     verb.add_argument("--partial", action="store_true", help="read what is there and mark what is missing")
     add_study_settings(verb)
-    verb.add_argument("--output", type=folder_to_write, metavar="DIR", help="default: where the DAG puts it")
+    verb.add_argument("--output", type=new_folder, metavar="DIR", help="default: where the DAG puts it")
     return verb
+
+
+def _target(parsed: argparse.Namespace) -> str:
+    """What Snakemake calls what this verb makes."""
+    if "number" in parsed:
+        return f"{parsed.verb}_{parsed.number}"
+    return str(parsed.name) if "name" in parsed else {"results": "all"}.get(parsed.verb, parsed.verb.replace("-", "_"))
 
 
 def _table(parsed: argparse.Namespace) -> None:

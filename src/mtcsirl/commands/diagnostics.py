@@ -2,7 +2,7 @@
 
 import argparse
 
-from mtcsirl.commands.arguments import Verbs, add_study_settings, add_verb, file_to_write, path, study_settings
+from mtcsirl.commands.arguments import Verbs, add_study_settings, add_verb, new_file, path, study_settings
 from mtcsirl.commands.drawing import write_figure
 
 
@@ -17,7 +17,7 @@ def register(verbs: Verbs) -> None:
         writes="the file --output as PNG and PDF",
     )
     drawing.add_argument("--run", required=True, type=path, metavar="DIR", dest="folder", help="folder of the IRL run")
-    drawing.add_argument("--output", required=True, type=file_to_write, metavar="FILE", help="for example s0.png")
+    drawing.add_argument("--output", required=True, type=new_file, metavar="FILE", help="for example s0.png")
     add_study_settings(drawing)
 
 

@@ -2,7 +2,7 @@
 
 import argparse
 
-from mtcsirl.commands.arguments import Verbs, add_verb, file_to_write, folder_to_write, path
+from mtcsirl.commands.arguments import Verbs, add_verb, new_file, new_folder, path
 
 
 def register(verbs: Verbs) -> None:
@@ -16,7 +16,7 @@ def register(verbs: Verbs) -> None:
         writes="--output; it holds pickled objects, which this package itself never reads",
     )
     policy.add_argument("--policy", required=True, type=path, metavar="DIR", help="folder of the agent")
-    policy.add_argument("--output", required=True, type=file_to_write, metavar="FILE.zip", help="file to write")
+    policy.add_argument("--output", required=True, type=new_file, metavar="FILE.zip", help="file to write")
 
     demonstrations = add_verb(
         verbs,
@@ -29,7 +29,7 @@ def register(verbs: Verbs) -> None:
     demonstrations.add_argument("--demonstrations", required=True, type=path, metavar="FILE", help="Parquet file")
     demonstrations.add_argument("--name", metavar="ID", help="Minari's id; default: mtcsirl/TASK-tTARGET-v0")
     demonstrations.add_argument(
-        "--output", required=True, type=folder_to_write, metavar="DIR", help="folder of Minari datasets"
+        "--output", required=True, type=new_folder, metavar="DIR", help="folder of Minari datasets"
     )
 
 

@@ -12,7 +12,7 @@ from mtcsirl.commands.arguments import (
     add_output,
     add_run_settings,
     add_verb,
-    chosen_experiment,
+    check_experiment,
     method,
     path,
     refuse_folder_of_others,
@@ -42,8 +42,8 @@ def _train_expert(verbs: Verbs) -> None:
         from mtcsirl.stages.train_expert import train_expert
         from mtcsirl.study.runs import Expert
 
-        own = partial(expert_run, task=parsed.task, cs_reward=parsed.cs_reward)
-        settings = run_settings(parsed, AgentRunSettings, own, "train_expert")
+        of_task = partial(expert_run, task=parsed.task, cs_reward=parsed.cs_reward)
+        settings = run_settings(parsed, AgentRunSettings, of_task, "train_expert")
         expert = Expert(parsed.cs_reward, parsed.task, parsed.target, parsed.seed)
         train_expert(settings, expert, parsed.output, wanted=parsed.identity)
 
@@ -117,9 +117,10 @@ def _learn_reward(verbs: Verbs) -> None:
 
         members = [member_of(file) for file in parsed.demonstrations]
         experiment, source = experiment_of(members)
-        chosen_experiment(parsed.experiment, members)
-        own = partial(irl_run, experiment=experiment, tasks={task for task, _ in members}, method=parsed.method)
-        settings = run_settings(parsed, IrlRunSettings, own, "learn_reward")
+        check_experiment(parsed.experiment, experiment, members)
+        tasks = {task for task, _ in members}
+        of_members = partial(irl_run, experiment=experiment, tasks=tasks, method=parsed.method)
+        settings = run_settings(parsed, IrlRunSettings, of_members, "learn_reward")
         learning = Learning(experiment, parsed.method, parsed.cs_reward, source, parsed.seed)
         learn_reward(settings, learning, parsed.demonstrations, parsed.output, wanted=parsed.identity)
 

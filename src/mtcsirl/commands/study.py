@@ -11,7 +11,7 @@ from mtcsirl.commands.arguments import (
     add_artefact,
     add_study_settings,
     add_verb,
-    file_to_write,
+    new_file,
     path,
     positive,
     study_settings,
@@ -201,7 +201,7 @@ def rates_to_write(given: str) -> Path:
     """A file for rates: a new one, or one that holds rates already."""
     from mtcsirl.study.plan import load_rates
 
-    file = file_to_write(given)
+    file = new_file(given)
     if file.exists():
         try:
             load_rates(file)

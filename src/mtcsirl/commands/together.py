@@ -12,7 +12,7 @@ from mtcsirl.commands.arguments import (
     positive,
     study_settings,
 )
-from mtcsirl.files.writable import check_folder
+from mtcsirl.files.storage import check_writable
 from mtcsirl.settings.machine import check_study
 
 AGENT_STAGES = ("train_sac", "train_expert", "transfer")
@@ -41,7 +41,7 @@ def _run(parsed: argparse.Namespace) -> None:
 
     settings = study_settings(parsed)
     check_study(settings)
-    check_folder(settings.results)
+    check_writable(settings.results, folder=True)
     runs = [run for run in design(settings, parsed.target).agents if run.stage in parsed.stages]
     trained = train_together(runs, settings, Path(settings.results), most=parsed.most, workers=parsed.workers)
     print(f"{trained} agents trained")

@@ -2,7 +2,7 @@
 
 import argparse
 
-from mtcsirl.commands.arguments import Verbs, add_output, add_verb, folder_to_write, positive
+from mtcsirl.commands.arguments import Verbs, add_output, add_verb, new_folder, path, positive
 from mtcsirl.commands.drawing import write_figure
 
 
@@ -17,11 +17,9 @@ def register(verbs: Verbs) -> None:
         writes="correlations.csv, agents.csv, curve.csv into --output; validation.pdf, .png into --figures",
     )
     add_output(verb, "results/validation")
-    verb.add_argument(
-        "--figures", type=folder_to_write, default="paper_figs", metavar="DIR", help="folder of the figure"
-    )
+    verb.add_argument("--figures", type=new_folder, default="paper_figs", metavar="DIR", help="folder of the figure")
+    verb.add_argument("--results", type=path, metavar="DIR", help="results folder where to note what was made")
     verb.add_argument("--processes", type=positive, default=1, help="seeds that run at the same time")
-    verb.add_argument("--results", type=folder_to_write, metavar="DIR", help="results folder where to note this")
 
 
 def _validate(parsed: argparse.Namespace) -> None:

@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from mtcsirl.commands.arguments import Verbs, add_verb, file_to_write, path, positive, seed, target, target_seed, task
+from mtcsirl.commands.arguments import Verbs, add_verb, new_file, path, positive, seed, target, target_seed, task
 from mtcsirl.errors import UserError
 
 EDGES = (64, 1024)
@@ -49,7 +49,7 @@ def _video(parsed: argparse.Namespace) -> None:
 
 def film(given: str) -> Path:
     """The file of a video."""
-    file = file_to_write(given)
+    file = new_file(given)
     if file.suffix.lower() not in (".gif", ".mp4"):
         raise UserError(f"{file}: videos end in .gif or .mp4")
     return file

@@ -37,7 +37,7 @@ def export_minari(demonstrations: Path | str, folder: Path | str, name: str | No
         raise UserError(f"{folder}: already holds {name}; choose another --name or delete it")
     folder.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix=".minari-", dir=folder) as place:
-        _write(Path(place), name, demonstrations, frame, task, target)
+        _write(Path(place), name, frame, task, target)
         for made in sorted(Path(place).rglob("namespace_metadata.json")):
             known = folder / made.relative_to(place)
             if not known.exists():
@@ -57,17 +57,14 @@ def _check_name(name: str) -> None:
         )
 
 
-def _write(root: Path, name: str, file: Path | str, frame: pd.DataFrame, task: str, target: int) -> None:
+def _write(root: Path, name: str, frame: pd.DataFrame, task: str, target: int) -> None:
     os.environ["MINARI_DATASETS_PATH"] = str(root.resolve())
     try:
         import minari
         from minari.data_collector import EpisodeBuffer
     except ImportError as error:
         raise UserError("Minari is not installed: pip install 'mtcsirl[export]'") from error
-    try:
-        buffers = [_episode(EpisodeBuffer, int(str(i)), steps) for i, steps in frame.groupby("episode", sort=True)]
-    except (ValueError, TypeError) as error:
-        raise UserError(f"{file}: not readable as demonstrations ({error}); collect them again") from error
+    buffers = [_episode(EpisodeBuffer, int(str(i)), steps) for i, steps in frame.groupby("episode", sort=True)]
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # it asks for an environment id and an address, which there are not
         _create(minari, name, buffers, task, target)

@@ -9,6 +9,7 @@ import fcntl
 import hashlib
 import json
 import os
+import tempfile
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -170,6 +171,31 @@ def checksum(path: Path | str) -> str:
 def remove(path: Path | str) -> None:
     """Delete a file if it is there."""
     Path(path).unlink(missing_ok=True)
+
+
+def check_writable(path: Path | str, *, folder: bool) -> None:
+    """Find out before any work whether a folder, or else a file, can be written at ``path``. Leaves nothing.
+
+    Raises:
+        UserError: something else is there, or what it would be in cannot be written or is full.
+    """
+    path = Path(path)
+    if path.exists() and not (path.is_dir() or path.is_file()):
+        raise UserError(f"{path}: is neither a file nor a folder; choose another name")
+    if path.exists() and path.is_dir() != folder:
+        raise UserError(f"{path}: is a file; name a folder" if folder else f"{path}: is a folder; name a file")
+    place = next(one for one in (path, *path.absolute().parents) if one.exists())
+    place = place.parent if not folder and place == path else place
+    if not place.is_dir():
+        raise UserError(f"{place}: is a file, so that {path} cannot be made; write elsewhere")
+    try:
+        with tempfile.TemporaryFile(dir=place) as probe:
+            probe.write(b"\0" * 4096)
+            probe.flush()
+    except OSError as error:
+        raise UserError(
+            f"{place}: cannot be written ({error.strerror}); make room there, or write elsewhere"
+        ) from error
 
 
 def append_line(path: Path | str, line: str) -> None:

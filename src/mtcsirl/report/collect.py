@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from mtcsirl.errors import UserError
+from mtcsirl.errors import MissingError
 from mtcsirl.figures import figure_spec
 from mtcsirl.figures.style import caption_of
 from mtcsirl.files import storage
@@ -41,7 +41,7 @@ def collect(settings: Settings, page: Path, *, partial: bool = False) -> ReportD
     missing = [(name, _title(name)) for name in ARTEFACTS if not _picture_or_table(name, settings).is_file()]
     if missing and not partial:
         path = _picture_or_table(missing[0][0], settings)
-        raise UserError(f"{path}: not there; make it with `snakemake {missing[0][0]}`, or ask for --partial results")
+        raise MissingError(f"{path}: not there")
     there = [name for name in ARTEFACTS if name not in dict(missing)]
     return ReportData(
         run=_what_was_run(settings, study, provenance),

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from mtcsirl.errors import UserError
+from mtcsirl.errors import MissingError, UserError
 from mtcsirl.files import storage
 from mtcsirl.names import CS_REWARDS, DIVERGED, KEPT, LAST, distance_metric
 from mtcsirl.results.completeness import POLICIES, what_lacks
@@ -284,7 +284,6 @@ def _standing(run: AnyRun, settings: Settings, partial: bool) -> tuple[str, str]
     stale = found.state == standings.STALE
     if not partial:
         state = "stale" if stale else "missing"
-        folder = Path(settings.results) / run.folder
         why = f" ({found.why[0]})" if found.why else ""
-        raise UserError(f"{folder}: this run is {state}{why}; make it with snakemake, or ask for --partial results")
+        raise MissingError(f"{Path(settings.results) / run.folder}: this run is {state}{why}")
     return (STALE, found.why[0]) if stale else (MISSING, "; ".join(found.why))

@@ -5,7 +5,7 @@ from typing import Annotated, TypeVar
 
 from pydantic import AfterValidator, Field
 
-from mtcsirl.names import TASKS
+from mtcsirl.names import EXPERIMENTS, TASKS
 
 
 def known_task(name: str) -> str:
@@ -28,9 +28,6 @@ def known_keys(budget: dict[str, Number]) -> dict[str, Number]:
         if name != "default":
             known_task(name)
     return budget
-
-
-EXPERIMENTS = ("single_target", "multi_target", "multi_task")
 
 
 def every_experiment(counts: dict[str, int]) -> dict[str, int]:

@@ -4,8 +4,9 @@ from typing import Literal
 
 from pydantic import Field
 
+from mtcsirl.names import EXPERIMENTS
 from mtcsirl.settings.base import Frozen, key
-from mtcsirl.settings.budgets import EXPERIMENTS, Updates
+from mtcsirl.settings.budgets import Updates
 from mtcsirl.settings.learner import RewardScaleSettings, Sizes, Temperature
 
 

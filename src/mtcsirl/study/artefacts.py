@@ -40,7 +40,7 @@ OTHERS: Mapping[str, tuple[str, ...]] = {
     "report": ("report.collect", "report.page"),
     "reward_quality": ("results.reward_quality",),
     "diagnostics": ("results.diagnosis",),
-    "validation": ("validation.study", "validation.figure", "irl.methods.mt_csirl"),
+    "validation": ("validation.recovery", "validation.figure", "irl.methods.mt_csirl"),
 }
 """Modules that make what is neither a table, a figure nor an ablation."""
 

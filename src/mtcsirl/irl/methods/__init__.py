@@ -1,5 +1,18 @@
-"""The IRL methods, a file each: the function ``<name>`` of ``<name>.py`` here, its name in ``names.py``."""
+"""The IRL methods, a file each: the function ``<name>`` of ``<name>.py`` here, its name in ``names.py``.
 
-from mtcsirl.extensions import METHODS
+A file is imported when its method is built.
+"""
+
+from importlib import import_module
+
+from mtcsirl import names
+from mtcsirl.extensions import METHODS, Builder
 
 __all__ = ["METHODS"]
+
+
+def _builder(name: str) -> Builder:
+    return lambda setup: getattr(import_module(f"mtcsirl.irl.methods.{name}"), name)(setup)
+
+
+METHODS.update({name: _builder(name) for name in names.METHODS})
