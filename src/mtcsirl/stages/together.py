@@ -15,7 +15,7 @@ from mtcsirl.agents.jobs import AgentJob, common_settings
 from mtcsirl.agents.training import train_agents
 from mtcsirl.errors import UserError
 from mtcsirl.files.provenance import Stopwatch
-from mtcsirl.files.storage import locked
+from mtcsirl.files.storage import locked, remove
 from mtcsirl.rewards.learned import WEIGHTS
 from mtcsirl.settings import Settings
 from mtcsirl.stages.training import expert_job, sac_job, sign, transfer_job
@@ -106,7 +106,9 @@ def _held(batch: list[AgentRun], results: Path) -> Iterator[list[AgentRun]]:
 def _train(batch: list[AgentRun], settings: Settings, results: Path, log: Callable[[str], None]) -> None:
     stopwatch = Stopwatch()
     jobs = [job_of(run, settings, results) for run in batch]
-    trained = train_agents(jobs, checkpoint=results / batch[0].folder / "together.safetensors", log=log)
+    checkpoint = results / batch[0].folder / "together.safetensors"
+    trained = train_agents(jobs, checkpoint=checkpoint, stopwatch=stopwatch, log=log)
     for run, agent in zip(batch, trained, strict=True):
         agent.save(results / run.folder)
         sign(results / run.folder, agent.job.settings, stopwatch, agent.job.inputs, agents=len(batch))
+    remove(checkpoint)

@@ -28,9 +28,9 @@ CHECKPOINT = "checkpoint.safetensors"
 
 def train(job: AgentJob, output: Path) -> None:
     """Train one agent: stages ``train_expert``, ``train_sac`` and ``transfer``, by their jobs below."""
-    with _run(job.settings, output, job.inputs):
+    with _run(job.settings, output, job.inputs) as stopwatch:
         events = output / "events" if job.settings.progress.tensorboard else None
-        (agent,) = train_agents([job], checkpoint=output / CHECKPOINT, events=events)
+        (agent,) = train_agents([job], checkpoint=output / CHECKPOINT, stopwatch=stopwatch, events=events)
         agent.save(output)
 
 
@@ -105,8 +105,8 @@ def learn_reward(
     from mtcsirl.irl.run import learn_reward as run_irl
 
     inputs = {f"demonstrations_{index}": Path(file) for index, file in enumerate(demonstrations)}
-    with _run(settings, output, inputs):
-        run_irl(output, method, cs_reward, demonstrations, seed, settings)
+    with _run(settings, output, inputs) as stopwatch:
+        run_irl(output, method, cs_reward, demonstrations, seed, settings, stopwatch=stopwatch)
 
 
 def score_reward(
@@ -128,12 +128,13 @@ def score_reward(
 
 
 @contextmanager
-def _run(settings: BaseModel, output: Path, inputs: Mapping[str, Path]) -> Iterator[None]:
-    """Hold the folder while the block fills it; then write its settings and provenance."""
+def _run(settings: BaseModel, output: Path, inputs: Mapping[str, Path]) -> Iterator[Stopwatch]:
+    """Hold the folder while the block fills it; then write its settings and provenance, and drop the checkpoint."""
     stopwatch = Stopwatch()
     with storage.locked(output):
-        yield
+        yield stopwatch
         sign(output, settings, stopwatch, inputs)
+        storage.remove(output / CHECKPOINT)
 
 
 def sign(
