@@ -95,7 +95,7 @@ def add_cs_reward(verb: argparse.ArgumentParser) -> None:
 def add_output(verb: argparse.ArgumentParser, default: str | None = None) -> None:
     """``--output``."""
     verb.add_argument(
-        "--output", required=default is None, default=default, type=Path, metavar="DIR", help="folder to write to"
+        "--output", required=default is None, default=default, type=new_folder, metavar="DIR", help="folder to write to"
     )
 
 
@@ -118,6 +118,25 @@ def target(text: str) -> int:
     if not text.isdecimal() or int(text) >= TARGETS_PER_TASK:
         raise argparse.ArgumentTypeError(f"target {text!r}: must be 0 ... {TARGETS_PER_TASK - 1}")
     return int(text)
+
+
+def new_folder(text: str) -> Path:
+    """A folder that can be written, or made."""
+    return _writable(text, folder=True)
+
+
+def new_file(text: str) -> Path:
+    """A file that can be written."""
+    return _writable(text, folder=False)
+
+
+def _writable(text: str, *, folder: bool) -> Path:
+    from mtcsirl.files.storage import check_writable
+
+    if not text:
+        raise argparse.ArgumentTypeError("empty; name a folder" if folder else "empty; name a file")
+    check_writable(text, folder=folder)
+    return Path(text)
 
 
 def natural(text: str) -> int:

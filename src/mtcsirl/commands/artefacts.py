@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
-from mtcsirl.commands.arguments import Verbs, add_study_settings, add_verb, study_settings
+from mtcsirl.commands.arguments import Verbs, add_study_settings, add_verb, new_folder, study_settings
 from mtcsirl.commands.drawing import write_figure
 from mtcsirl.settings import Settings
 from mtcsirl.study.ablations import ABLATIONS
@@ -36,7 +36,7 @@ def register(verbs: Verbs) -> None:
         verbs, "ablation", _ablation, does="draw an ablation", writes="NAME.csv; NAME.pdf, .png into --figures"
     )
     ablation.add_argument("name", choices=tuple(ABLATIONS), metavar="NAME", help=", ".join(ABLATIONS))
-    ablation.add_argument("--figures", type=Path, metavar="DIR", help="default: where the DAG puts it")
+    ablation.add_argument("--figures", type=new_folder, metavar="DIR", help="default: where the DAG puts it")
     _add(
         verbs,
         "reward-quality",
@@ -72,7 +72,7 @@ def _add(
         verb.add_argument("number", choices=numbers, metavar="N", help=f"as in the paper: {', '.join(numbers)}")
     verb.add_argument("--partial", action="store_true", help="read what is there and mark what is missing")
     add_study_settings(verb)
-    verb.add_argument("--output", type=Path, metavar="DIR", help="default: where the DAG puts it")
+    verb.add_argument("--output", type=new_folder, metavar="DIR", help="default: where the DAG puts it")
     return verb
 
 

@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from mtcsirl.commands.arguments import Verbs, add_study_settings, add_verb, study_settings
+from mtcsirl.commands.arguments import Verbs, add_study_settings, add_verb, new_file, study_settings
 from mtcsirl.commands.drawing import write_figure
 
 
@@ -18,7 +18,7 @@ def register(verbs: Verbs) -> None:
         writes="the file --output as PNG and PDF",
     )
     drawing.add_argument("--run", required=True, type=Path, metavar="DIR", dest="folder", help="folder of the IRL run")
-    drawing.add_argument("--output", required=True, type=Path, metavar="FILE", help="for example s0.png")
+    drawing.add_argument("--output", required=True, type=new_file, metavar="FILE", help="for example s0.png")
     add_study_settings(drawing)
 
 

@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from mtcsirl.commands.arguments import Verbs, add_verb
+from mtcsirl.commands.arguments import Verbs, add_verb, new_file, new_folder
 
 
 def register(verbs: Verbs) -> None:
@@ -17,7 +17,7 @@ def register(verbs: Verbs) -> None:
         writes="--output; it holds pickled objects, which this package itself never reads",
     )
     policy.add_argument("--policy", required=True, type=Path, metavar="DIR", help="folder of the agent")
-    policy.add_argument("--output", required=True, type=Path, metavar="FILE.zip", help="file to write")
+    policy.add_argument("--output", required=True, type=new_file, metavar="FILE.zip", help="file to write")
 
     demonstrations = add_verb(
         verbs,
@@ -29,7 +29,9 @@ def register(verbs: Verbs) -> None:
     )
     demonstrations.add_argument("--demonstrations", required=True, type=Path, metavar="FILE", help="Parquet file")
     demonstrations.add_argument("--name", metavar="ID", help="Minari's id; default: mtcsirl/TASK-tTARGET-v0")
-    demonstrations.add_argument("--output", required=True, type=Path, metavar="DIR", help="folder of Minari datasets")
+    demonstrations.add_argument(
+        "--output", required=True, type=new_folder, metavar="DIR", help="folder of Minari datasets"
+    )
 
 
 def _export_policy(parsed: argparse.Namespace) -> None:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from mtcsirl.commands.arguments import Verbs, add_artefact, add_study_settings, add_verb, study_settings
+from mtcsirl.commands.arguments import Verbs, add_artefact, add_study_settings, add_verb, new_file, study_settings
 from mtcsirl.study.ablations import ABLATIONS
 from mtcsirl.study.design import ARTEFACTS, design
 
@@ -71,7 +71,7 @@ def register(verbs: Verbs) -> None:
         needs="a machine that has nothing else to do",
         writes="the file that plan reads, --output",
     )
-    calibrate.add_argument("--output", type=Path, required=True, metavar="FILE", help="a JSON file")
+    calibrate.add_argument("--output", type=new_file, required=True, metavar="FILE", help="a JSON file")
 
 
 def _plan(parsed: argparse.Namespace) -> None:

@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from mtcsirl.commands.arguments import Verbs, add_output, add_verb, natural
+from mtcsirl.commands.arguments import Verbs, add_output, add_verb, natural, new_folder
 from mtcsirl.commands.drawing import write_figure
 
 
@@ -18,7 +18,9 @@ def register(verbs: Verbs) -> None:
         writes="correlations.csv, agents.csv, curve.csv into --output; validation.pdf, .png into --figures",
     )
     add_output(verb, "results/validation")
-    verb.add_argument("--figures", type=Path, default=Path("paper_figs"), metavar="DIR", help="folder of the figure")
+    verb.add_argument(
+        "--figures", type=new_folder, default=Path("paper_figs"), metavar="DIR", help="folder of the figure"
+    )
     verb.add_argument("--processes", type=natural, default=1, help="seeds that run at the same time")
 
 

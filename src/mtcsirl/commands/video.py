@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from mtcsirl.commands.arguments import Verbs, add_verb, natural, target, task
+from mtcsirl.commands.arguments import Verbs, add_verb, natural, new_file, target, task
 from mtcsirl.errors import UserError
 
 
@@ -19,7 +19,7 @@ def register(verbs: Verbs) -> None:
         writes="the file --output, a GIF or MP4",
     )
     verb.add_argument("folders", nargs="+", type=Path, metavar="FOLDER", help="run folder of an expert, SAC, ...")
-    verb.add_argument("--output", required=True, type=Path, metavar="FILE", help="ends in .gif or .mp4")
+    verb.add_argument("--output", required=True, type=new_file, metavar="FILE", help="ends in .gif or .mp4")
     verb.add_argument("--label", action="append", default=[], metavar="TEXT", help="one per folder, in their order")
     verb.add_argument("--task", type=task, metavar="TASK", help="another task than the one that was trained on")
     verb.add_argument("--target", type=target, metavar="INDEX", help="another target than the one that was trained on")

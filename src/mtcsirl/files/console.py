@@ -43,19 +43,19 @@ def protect() -> None:
         try:
             os.fstat(number)
         except OSError:
-            os.open(os.devnull, os.O_RDWR)
-    for name in ("stdout", "stderr"):
+            os.set_inheritable(os.open(os.devnull, os.O_RDWR), True)  # the lowest free number is this one
+    for number, name in ((1, "stdout"), (2, "stderr")):
         stream = getattr(sys, name)
-        if stream is not None and stream is getattr(sys, f"__{name}__"):
-            setattr(sys, name, _patient(stream))
+        if stream is getattr(sys, f"__{name}__"):  # else somebody listens, a test for example
+            if stream is not None:
+                stream.flush()
+            setattr(sys, name, _patient(number, getattr(stream, "encoding", None)))
 
 
-def _patient(stream: Any) -> io.TextIOWrapper:
-    with suppress(OSError):
-        stream.flush()
-    raw = PatientFile(stream.fileno(), "w", closefd=False)
+def _patient(number: int, encoding: str | None) -> io.TextIOWrapper:
+    raw = PatientFile(number, "w", closefd=False)
     # by lines, so that a log holds what its job had said when it is killed
-    return io.TextIOWrapper(io.BufferedWriter(raw), stream.encoding, "replace", line_buffering=True)
+    return io.TextIOWrapper(io.BufferedWriter(raw), encoding, "replace", line_buffering=True)
 
 
 def lost() -> str | None:

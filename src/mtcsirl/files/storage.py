@@ -167,6 +167,23 @@ def remove(path: Path | str) -> None:
     Path(path).unlink(missing_ok=True)
 
 
+def check_writable(path: Path | str, *, folder: bool) -> None:
+    """Find out before any work whether a folder, or else a file, can be written at ``path``. Makes nothing.
+
+    Raises:
+        UserError: something else is there, or what it would be in cannot be written.
+    """
+    path = Path(path)
+    if path.exists() and path.is_dir() != folder:
+        raise UserError(f"{path}: is a file; name a folder" if folder else f"{path}: is a folder; name a file")
+    place = next(one for one in (path, *path.absolute().parents) if one.exists())
+    place = place.parent if not folder and place == path else place
+    if not place.is_dir():
+        raise UserError(f"{place}: is a file, so that {path} cannot be made; write elsewhere")
+    if not os.access(place, os.W_OK | os.X_OK):
+        raise UserError(f"{place}: cannot be written; change its permissions, or write elsewhere")
+
+
 def append_line(path: Path | str, line: str) -> None:
     """Append one line to a log that may be cut off anywhere."""
     path = Path(path)
