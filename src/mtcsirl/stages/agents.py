@@ -26,8 +26,14 @@ def agent_task(
 
 def train(job: AgentJob, task: Task) -> None:
     """Train one agent."""
-    with running(task) as needed:
-        if needed:
+    with running(task) as stopwatch:
+        if stopwatch is not None:
             events = task.output / "events" if job.settings.progress.tensorboard else None
-            (agent,) = train_agents([job], checkpoints=[task.output / CHECKPOINT], events=events)
+            (agent,) = train_agents(
+                [job],
+                checkpoints=[task.output / CHECKPOINT],
+                runs=[task.identity.hash],
+                stopwatch=stopwatch,
+                events=events,
+            )
             agent.save(task.output)

@@ -120,6 +120,8 @@ def _train(batch: list[AgentRun], settings: Settings, results: Path, workers: in
         tasks.append(agent_task(run.stage, about, job, results / run.folder, None, inputs))
         begin(tasks[-1])
     checkpoints = [task.output / CHECKPOINT for task in tasks]
-    for agent, task in zip(train_agents(jobs, checkpoints=checkpoints, log=log, workers=workers), tasks, strict=True):
+    runs = [task.identity.hash for task in tasks]
+    trained = train_agents(jobs, checkpoints=checkpoints, runs=runs, stopwatch=stopwatch, log=log, workers=workers)
+    for agent, task in zip(trained, tasks, strict=True):
         agent.save(task.output)
         sign(task, stopwatch, agents=len(batch))
