@@ -43,6 +43,11 @@ class AgentJob:
     inputs: Mapping[str, Path] = field(default_factory=dict)
     """Files that the job was made from, by name; provenance.json lists their checksums."""
 
+    @property
+    def label(self) -> str:
+        """The agent in a line to the user."""
+        return f"{self.task}-t{self.target} s{self.seed}"
+
     def mixture(self) -> RewardMixture:
         """The reward that this agent's policy is trained on."""
         settings = self.settings
@@ -64,6 +69,8 @@ class TrainedAgent:
     curve: pd.DataFrame
     evaluation: list[Row]
     gate: dict[str, Any]
+    lockstep: tuple[str, ...] = ()
+    """Labels of all agents that trained beside it and of itself: where a number was made, no part of the number."""
 
     def save(self, folder: Path | str) -> None:
         """Write policy.safetensors, policy.json, curve.csv, evaluation.csv and gate.json."""
@@ -91,7 +98,7 @@ def shared_settings(jobs: Sequence[AgentJob]) -> AgentRunSettings:
     for job in jobs:
         if common_settings(job.settings) != first:
             raise UserError(
-                f"{job.task}-t{job.target} s{job.seed}: agents in lockstep share all settings but reward_scale, "
+                f"{job.label}: agents in lockstep share all settings but reward_scale, "
                 "cs_weight, curriculum, scripted_steps and held_share; train it on its own"
             )
     return jobs[0].settings

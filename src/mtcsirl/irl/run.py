@@ -19,14 +19,15 @@ from mtcsirl.episodes.evaluation import COLUMNS, evaluate, gate_verdict, measure
 from mtcsirl.episodes.lockstep import make_environments
 from mtcsirl.episodes.policy import Policy, save_policy
 from mtcsirl.errors import UserError
-from mtcsirl.files.storage import checksum, read_tensors, remove, write_csv, write_json, write_parquet, write_tensors
+from mtcsirl.files.storage import checksum, read_tensors, write_csv, write_json, write_parquet, write_tensors
 from mtcsirl.irl.methods import METHODS
 from mtcsirl.irl.methods.base import Setup
+from mtcsirl.irl.resume import load_state, state
 from mtcsirl.irl.rollout import World
 from mtcsirl.irl.trainer import IrlTrainer
+from mtcsirl.rewards.adapter import ground_truth
 from mtcsirl.rewards.ground_truth import COMMON_SENSE_REWARDS
 from mtcsirl.rewards.learned import LearnedReward, save_learned_reward
-from mtcsirl.rewards.mixture import ground_truth
 from mtcsirl.settings.runs import IrlRunSettings
 from mtcsirl.study.outputs import CURVE_COLUMNS, DIAGNOSTIC_COLUMNS
 from mtcsirl.transitions import Transitions
@@ -52,10 +53,11 @@ def learn_reward(
     """Learn a reward from T files of demonstrations, one per (task, target), and write the run into ``folder``.
 
     ``cs_reward`` names what the experts were trained with; it is measured, never trained on. A checkpoint in
-    ``folder`` of the same run is taken up, and the run ends with the bytes of one that was never stopped.
+    ``folder`` of the same run is taken up, and the run ends with the bytes of one that was never stopped. Who signs the
+    run removes the checkpoint.
 
     Raises:
-        UserError: unknown method or cs-reward; unreadable demonstrations.
+        UserError: unknown method or cs-reward; unreadable demonstrations; a number that is not finite any more.
     """
     folder = Path(folder)
     trainer = make_trainer(method, cs_reward, demonstrations, seed, settings)
@@ -65,7 +67,6 @@ def learn_reward(
         _write(trainer, folder, cs_reward, seed, dict(about or {}))
     finally:
         trainer.world.environments.close()
-    remove(folder / CHECKPOINT)
 
 
 def make_trainer(
@@ -98,7 +99,7 @@ def _train(trainer: IrlTrainer, checkpoint: Path, fingerprint: str) -> None:
         trainer.iterate()
         _LOG.info("%s", _progress(trainer))
         if trainer.iteration % every == 0 and trainer.iteration < trainer.iterations:
-            write_tensors(checkpoint, trainer.state() | _rows_to_tensors(trainer, fingerprint))
+            write_tensors(checkpoint, state(trainer) | _rows_to_tensors(trainer, fingerprint))
 
 
 def _progress(trainer: IrlTrainer) -> str:
@@ -130,7 +131,7 @@ def _resume(trainer: IrlTrainer, checkpoint: Path, fingerprint: str) -> None:
     if rows["run"] != fingerprint:
         _LOG.warning("%s: of a run with other settings; starting over", checkpoint)
         return
-    trainer.load_state(tensors)
+    load_state(trainer, tensors)
     trainer.curve, trainer.diagnostics = rows["curve"], rows["diagnostics"]
 
 

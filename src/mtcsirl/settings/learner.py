@@ -27,6 +27,7 @@ class LearnerSettings(Frozen):
     hidden_sizes: tuple[int, ...] = key(
         (256, 256), "hidden layers of actor and critics", unit="units", paper=(256, 256), min_length=1
     )
+    critics: int = key(2, "critics of an agent; their least value counts", unit="networks", ge=1)
     policy_learning_rate: float = key(1.0e-3, "Adam step size of the actor", paper=3.0e-4, gt=0)
     critic_learning_rate: float = key(1.0e-3, "Adam step size of the critics", paper=3.0e-4, gt=0)
     temperature_learning_rate: float = key(

@@ -1,7 +1,7 @@
 """The agents of a study in lockstep: many in one process, at about two thirds of the cost of one job each.
 
-What it leaves is what the DAG's jobs leave, so Snakemake goes on from it. An agent's exploration noise and minibatches
-come from streams that it shares with the others: its numbers are another draw of what the job with its seed gets.
+What it leaves is what the DAG's jobs leave, byte for byte, so Snakemake goes on from it; so do their checkpoints: a
+batch that is stopped can be taken up by jobs of one agent each, and they by a batch.
 """
 
 from __future__ import annotations
@@ -15,10 +15,10 @@ from mtcsirl.agents.jobs import AgentJob, common_settings
 from mtcsirl.agents.training import train_agents
 from mtcsirl.errors import UserError
 from mtcsirl.files.provenance import Stopwatch
-from mtcsirl.files.storage import locked
+from mtcsirl.files.storage import locked, remove
 from mtcsirl.rewards.learned import WEIGHTS
 from mtcsirl.settings import Settings
-from mtcsirl.stages.training import expert_job, sac_job, sign, transfer_job
+from mtcsirl.stages.training import CHECKPOINT, expert_job, sac_job, sign, transfer_job
 from mtcsirl.study.outputs import OUTPUTS
 from mtcsirl.study.runs import Baseline, Expert, Run, Transfer
 
@@ -54,7 +54,7 @@ def train_together(
     """Train the agents among ``runs`` that are missing below ``results`` and whose reward is there; returns how many.
 
     ``most``: agents in one batch. Agents that another process holds are left to it, so several of these calls share
-    the work. A batch that is stopped is taken up by the next call that finds the same agents missing.
+    the work. Agents of a batch that is stopped go on from where they were, whichever call takes them up.
     """
     trained = 0
     for batch in _batches(runs, settings, results, most):
@@ -106,7 +106,9 @@ def _held(batch: list[AgentRun], results: Path) -> Iterator[list[AgentRun]]:
 def _train(batch: list[AgentRun], settings: Settings, results: Path, log: Callable[[str], None]) -> None:
     stopwatch = Stopwatch()
     jobs = [job_of(run, settings, results) for run in batch]
-    trained = train_agents(jobs, checkpoint=results / batch[0].folder / "together.safetensors", log=log)
-    for run, agent in zip(batch, trained, strict=True):
+    checkpoints = [results / run.folder / CHECKPOINT for run in batch]
+    trained = train_agents(jobs, checkpoints=checkpoints, log=log)
+    for run, agent, checkpoint in zip(batch, trained, checkpoints, strict=True):
         agent.save(results / run.folder)
         sign(results / run.folder, agent.job.settings, stopwatch, agent.job.inputs, agents=len(batch))
+        remove(checkpoint)

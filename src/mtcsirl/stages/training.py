@@ -14,8 +14,8 @@ from mtcsirl.agents.training import AgentJob, train_agents
 from mtcsirl.episodes.policy import load_policy
 from mtcsirl.files import storage
 from mtcsirl.files.provenance import Stopwatch, write_provenance
+from mtcsirl.rewards.adapter import ground_truth
 from mtcsirl.rewards.learned import DESCRIPTION, WEIGHTS, load_learned_reward
-from mtcsirl.rewards.mixture import ground_truth
 from mtcsirl.settings.runs import (
     AgentRunSettings,
     DemonstrationRunSettings,
@@ -30,7 +30,7 @@ def train(job: AgentJob, output: Path) -> None:
     """Train one agent: stages ``train_expert``, ``train_sac`` and ``transfer``, by their jobs below."""
     with _run(job.settings, output, job.inputs):
         events = output / "events" if job.settings.progress.tensorboard else None
-        (agent,) = train_agents([job], checkpoint=output / CHECKPOINT, events=events)
+        (agent,) = train_agents([job], checkpoints=[output / CHECKPOINT], events=events)
         agent.save(output)
 
 
@@ -134,6 +134,7 @@ def _run(settings: BaseModel, output: Path, inputs: Mapping[str, Path]) -> Itera
     with storage.locked(output):
         yield
         sign(output, settings, stopwatch, inputs)
+        storage.remove(output / CHECKPOINT)
 
 
 def sign(
