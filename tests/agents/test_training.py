@@ -12,8 +12,7 @@ from mtcsirl.agents.jobs import AgentJob, gate_score
 from mtcsirl.agents.training import Training, train_agents
 from mtcsirl.errors import UserError
 from mtcsirl.rewards.adapter import ground_truth
-
-WRITTEN = ("curve.csv", "evaluation.csv", "gate.json", "policy.json", "policy.safetensors")
+from tests.agents.bytes import killed_at, run
 
 
 def expert(settings, seed=0, task="reach"):
@@ -31,42 +30,12 @@ def with_learner(settings, learner):
     return with_sac(settings, learner=learner, **(same if learner == "stable_baselines3" else {}))
 
 
-def run(jobs, folder, **options):
-    """Train and save; return the bytes of everything written."""
-    agents = train_agents(jobs, **({"log": lambda line: None} | options))
-    for index, agent in enumerate(agents):
-        agent.save(folder / str(index))
-    return {
-        f"{index}/{name}": (folder / str(index) / name).read_bytes() for index in range(len(agents)) for name in WRITTEN
-    }
-
-
 @pytest.mark.parametrize("learner", ["fused", "stable_baselines3"])
 def test_training_twice_gives_the_same_bytes(small_run, tmp_path, learner):
     settings = with_learner(small_run, learner)
     first = run([expert(settings)], tmp_path / "first")
     assert first == run([expert(settings)], tmp_path / "second")
     assert first != run([expert(settings, seed=1)], tmp_path / "other")
-
-
-class KilledError(Exception):
-    pass
-
-
-def killed_at(step, jobs, checkpoints):
-    """Train until so many steps are made; the checkpoints remain."""
-    killed = Training(jobs, checkpoints=checkpoints, log=lambda line: None)
-    original = killed.environments.step
-
-    def counted(action):
-        if killed.step == step:
-            raise KilledError
-        return original(action)
-
-    killed.environments.step = counted
-    with pytest.raises(KilledError):
-        killed.run()
-    killed.close()
 
 
 @pytest.mark.parametrize("learner", ["fused", "stable_baselines3"])
@@ -101,11 +70,6 @@ def test_with_a_damaged_checkpoint_a_run_starts_from_the_beginning(small_run, tm
     assert "checkpoint" in lines[0]
     assert lines[0].endswith("starting from the beginning")
     assert found == run([expert(small_run)], tmp_path / "without")
-
-
-def test_workers_change_nothing(small_run, tmp_path):
-    jobs = [expert(small_run, 0), expert(small_run, 1, "drawer-close")]
-    assert run(jobs, tmp_path / "here") == run(jobs, tmp_path / "workers", workers=2)
 
 
 def test_agents_in_lockstep_may_differ_in_reward_alone(small_run, tmp_path):

@@ -78,11 +78,11 @@ class ReferenceSac:
     @torch.no_grad()
     def act(self, observation: Tensor, deterministic: bool = False) -> Tensor:
         """Actions [A, 4] for observations [A, 39]."""
-        actions = []
+        actions = torch.full((self.agents, self._view.action_size), torch.nan, device=self.device)
         for agent, row in enumerate(observation):
             with self._as(agent) as model:
-                actions.append(model.actor(row[None], deterministic=deterministic))
-        return torch.cat(actions)
+                actions[agent] = model.actor(row[None], deterministic=deterministic)
+        return actions
 
     def update(self, observation: Tensor, action: Tensor, reward: Tensor, next_observation: Tensor) -> None:
         """One gradient step of every model on its own minibatch [A, B, ...]."""
@@ -95,9 +95,16 @@ class ReferenceSac:
 
     @contextmanager
     def _as(self, agent: int) -> Iterator[SAC]:
-        """A model with torch's random numbers where it left them."""
+        """A model with torch's random numbers where it left them.
+
+        The library refuses a policy that is not finite with an error of its own; ours is for who asks `broken_agents`.
+        """
         torch.set_rng_state(self._random[agent])
-        yield self.models[agent]
+        try:
+            yield self.models[agent]
+        except ValueError:
+            if agent not in self.broken_agents():
+                raise
         self._random[agent] = torch.get_rng_state()
 
     def fix_temperature(self, value: float) -> None:
