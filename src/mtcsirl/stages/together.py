@@ -11,6 +11,7 @@ from contextlib import ExitStack, contextmanager
 from itertools import groupby
 from pathlib import Path
 
+from mtcsirl.agents.finite import NotFiniteError
 from mtcsirl.agents.jobs import AgentJob, common_settings
 from mtcsirl.agents.training import train_agents
 from mtcsirl.errors import UserError
@@ -107,7 +108,14 @@ def _train(batch: list[AgentRun], settings: Settings, results: Path, log: Callab
     stopwatch = Stopwatch()
     jobs = [job_of(run, settings, results) for run in batch]
     checkpoints = [results / run.folder / CHECKPOINT for run in batch]
-    trained = train_agents(jobs, checkpoints=checkpoints, log=log)
+    try:
+        trained = train_agents(jobs, checkpoints=checkpoints, log=log)
+    except NotFiniteError as error:
+        healthy = [run for index, run in enumerate(batch) if index not in error.agents]
+        if healthy and len(healthy) < len(batch):
+            log(f"{error}; going on without it")
+            _train(healthy, settings, results, log)
+        raise
     for run, agent, checkpoint in zip(batch, trained, checkpoints, strict=True):
         agent.save(results / run.folder)
         sign(results / run.folder, agent.job.settings, stopwatch, agent.job.inputs, agents=len(batch))
