@@ -5,7 +5,9 @@ from pathlib import Path
 import pytest
 
 from mtcsirl.settings.runs import AgentRunSettings
-from mtcsirl.stages import training as stages
+from mtcsirl.stages.learn_reward import Learning, learn_reward
+from mtcsirl.stages.train_expert import train_expert
+from mtcsirl.study.runs import Expert
 from tests.faults.harness import Stage
 from tests.irl.conftest import demonstrations as demonstrations
 from tests.irl.conftest import irl_settings
@@ -13,12 +15,13 @@ from tests.irl.conftest import irl_settings
 
 def _agent(small_run: AgentRunSettings, demonstrations: list[Path]) -> Stage:
     settings = small_run.model_copy(update={"steps": 1000})
-    return lambda folder: stages.train(stages.expert_job(settings, "reach", 1, "velocity", 0), folder)
+    return lambda folder: train_expert(settings, Expert("velocity", "reach", 1, 0), folder)
 
 
 def _irl(small_run: AgentRunSettings, demonstrations: list[Path]) -> Stage:
     settings = irl_settings(iterations=6)
-    return lambda folder: stages.learn_reward(settings, "mt_csirl", "velocity", demonstrations, 100, folder)
+    learning = Learning("multi_task", "mt_csirl", "velocity", "all", 100)
+    return lambda folder: learn_reward(settings, learning, demonstrations, folder)
 
 
 @pytest.fixture(params=[_agent, _irl], ids=["agent", "irl"])

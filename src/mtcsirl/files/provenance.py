@@ -7,7 +7,7 @@ import platform
 import resource
 import subprocess
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -82,11 +82,16 @@ class Stopwatch:
 
 
 def write_provenance(
-    folder: Path | str, stopwatch: Stopwatch, inputs: Mapping[str, Path] | None = None, *, agents: int = 1
+    folder: Path | str,
+    stopwatch: Stopwatch,
+    inputs: Mapping[str, Path] | None = None,
+    *,
+    agents: int = 1,
+    lockstep: Sequence[str] = (),
 ) -> None:
     """Write ``provenance.json`` into a run folder: commit, versions, machine, cost, checksums of the inputs.
 
-    ``agents``: how many runs the process made at once; each bears its share of the time.
+    ``agents``: how many runs the process made at once; each bears its share of the time. ``lockstep``: which they were.
     """
     write_json(
         Path(folder) / "provenance.json",
@@ -95,6 +100,7 @@ def write_provenance(
             "versions": _versions(),
             "machine": machine(),
             "cost": stopwatch.read(agents),
+            "lockstep": list(lockstep) if len(lockstep) > 1 else [],
             "inputs": {name: checksum(path) for name, path in sorted((inputs or {}).items())},
         },
     )

@@ -24,11 +24,12 @@ from mtcsirl.files.provenance import Stopwatch
 from mtcsirl.files.storage import checksum, write_csv, write_json, write_parquet
 from mtcsirl.irl.methods import METHODS
 from mtcsirl.irl.methods.base import Setup
+from mtcsirl.irl.resume import load_state, state
 from mtcsirl.irl.rollout import World
 from mtcsirl.irl.trainer import IrlTrainer
+from mtcsirl.rewards.adapter import ground_truth
 from mtcsirl.rewards.ground_truth import COMMON_SENSE_REWARDS
 from mtcsirl.rewards.learned import LearnedReward, save_learned_reward
-from mtcsirl.rewards.mixture import ground_truth
 from mtcsirl.settings.runs import IrlRunSettings
 from mtcsirl.study.outputs import CURVE_COLUMNS, DIAGNOSTIC_COLUMNS
 from mtcsirl.transitions import Transitions
@@ -61,7 +62,7 @@ def learn_reward(
     of another run is not taken up. ``stopwatch`` learns what earlier tries spent.
 
     Raises:
-        UserError: unknown method or cs-reward; unreadable demonstrations.
+        UserError: unknown method or cs-reward; unreadable demonstrations; a number that is not finite any more.
     """
     folder = Path(folder)
     trainer = make_trainer(method, cs_reward, demonstrations, seed, settings)
@@ -106,7 +107,7 @@ def _train(trainer: IrlTrainer, checkpoint: Path, run: str, stopwatch: Stopwatch
         due = trainer.iteration % every == 0 and trainer.iteration < trainer.iterations
         if due or stop.requested():
             rows = {"curve": trainer.curve, "diagnostics": trainer.diagnostics}
-            save_checkpoint(checkpoint, trainer.state(), rows | {"spent": stopwatch.read()}, run=run)
+            save_checkpoint(checkpoint, state(trainer), rows | {"spent": stopwatch.read()}, run=run)
             stop.stop_here(f"iteration {trainer.iteration}")
 
 
@@ -128,7 +129,7 @@ def _resume(trainer: IrlTrainer, checkpoint: Path, run: str, stopwatch: Stopwatc
     if saved is None:
         return
     tensors, notes = saved
-    trainer.load_state(tensors)
+    load_state(trainer, tensors)
     trainer.curve, trainer.diagnostics = notes["curve"], notes["diagnostics"]
     stopwatch.add(notes["spent"])
     _LOG.info("resumed at iteration %d", trainer.iteration)

@@ -1,6 +1,7 @@
 """What the three stages that train one agent share."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 from mtcsirl.agents.jobs import AgentJob
@@ -30,9 +31,8 @@ def train(job: AgentJob, task: Task) -> None:
         if stopwatch is not None:
             events = task.output / "events" if job.settings.progress.tensorboard else None
             (agent,) = train_agents(
-                [job],
+                [replace(job, made_from=task.identity.hash)],
                 checkpoints=[task.output / CHECKPOINT],
-                runs=[task.identity.hash],
                 stopwatch=stopwatch,
                 events=events,
             )

@@ -110,13 +110,13 @@ def begin(task: Task) -> None:
     write_marker(task.output, None)
 
 
-def sign(task: Task, stopwatch: Stopwatch, *, agents: int = 1) -> None:
+def sign(task: Task, stopwatch: Stopwatch, *, agents: int = 1, lockstep: Sequence[str] = ()) -> None:
     """Leave settings, provenance, record and marker beside the results of a run, one of ``agents`` made at once.
 
     The checkpoint goes last: until then nothing is lost that was computed.
     """
     storage.write_json(task.output / "settings.json", task.settings.model_dump(mode="json"))
-    write_provenance(task.output, stopwatch, task.files, agents=agents)
+    write_provenance(task.output, stopwatch, task.files, agents=agents, lockstep=lockstep)
     left = checksums(task.output, result_files(task.output))
     storage.write_text(task.output / FILE, dumps(Record(task.identity, left, task.read)))
     write_marker(task.output, task.identity.hash)
