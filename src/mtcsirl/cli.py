@@ -28,7 +28,13 @@ _WAYS_OUT = {
     errno.EPERM: "change its permissions, or write elsewhere",
     errno.EROFS: "write elsewhere",
 }
-_NO_MEMORY = ("can't allocate memory", "out of memory", "cannot allocate memory", "failed to map segment", "bad_alloc")
+_NO_MEMORY = (
+    "allocate memory",
+    "out of memory",
+    "memory allocation failed",
+    "failed to map segment",
+    "bad_alloc",
+)
 
 
 class Parser(argparse.ArgumentParser):

@@ -61,6 +61,8 @@ def test_at_every_file_event_of_a_run(stage: Stage, tmp_path: Path) -> None:
     """Before and after every fsync, rename and removal: results, settings, provenance, checkpoints, the lock."""
     whole = tmp_path / "whole"
     assert ended(fork(lambda: _dies_at(-1, stage, whole))) == 0
+    assert {path.name for path in whole.glob("*")} >= {"settings.json", "provenance.json"}
+    assert not list(whole.glob("checkpoint*"))
     events = int((tmp_path / "events").read_text())
     assert events > 30, "the harness sees what the run does"
     chosen = range(events) if LONG else sorted(random.Random(0).sample(range(events), 8))
