@@ -124,7 +124,7 @@ WITH: dict[str, dict[str, Any]] = {
 
 def other(key: str, value: Any) -> Any:
     """A value of ``key`` that is not ``value``."""
-    if key in OTHERS and isinstance(OTHERS[key], dict) == isinstance(value, dict):
+    if key in OTHERS and OTHERS[key] != value and isinstance(OTHERS[key], dict) == isinstance(value, dict):
         return OTHERS[key]
     if isinstance(value, bool):
         return not value
