@@ -3,19 +3,29 @@
 import json
 import subprocess
 import sys
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import pytest
 import yaml
-from pydantic import ValidationError
+from pydantic import BaseModel, ValidationError
 
 from mtcsirl.errors import UserError
 from mtcsirl.extensions import METHODS
+from mtcsirl.names import EXPERIMENTS
 from mtcsirl.rewards.ground_truth import COMMON_SENSE_REWARDS
 from mtcsirl.settings import Settings, granted
 from mtcsirl.settings.loading import load, merge, override, read_yaml, validate
-from mtcsirl.settings.runs import irl_run
+from mtcsirl.settings.runs import (
+    IrlRunSettings,
+    baseline_run,
+    demonstration_run,
+    expert_run,
+    irl_run,
+    score_run,
+    transfer_run,
+)
 from mtcsirl.settings.template import as_json, deviations, keys, schema, template
 
 
@@ -261,3 +271,78 @@ def test_settings_and_study_import_neither_torch_nor_snakemake(module: str) -> N
 def test_no_task_slips_through_the_smoke_scales_budget(section: str) -> None:
     """An overlay merges mappings: a task that gets a budget of its own at desk scale has to be named there too."""
     assert set(getattr(load(scale="smoke"), section).steps.values()) == {400}
+
+
+def test_a_key_of_the_generators_stands_once_per_run() -> None:
+    """Temperature and scale of a run's generators are those of its ``sac``; the study has them under ``irl``."""
+    study = validate(Settings, {"irl": {"temperature": "automatic", "initial_temperature": 0.5, "reward_scale": 0.2}})
+    run = irl_run(study, "single_target", ["reach"])
+    assert (run.sac.temperature, run.sac.initial_temperature, run.sac.reward_scale) == ("automatic", 0.1, 0.2)
+    for name in ("temperature", "initial_temperature", "reward_scale"):
+        with pytest.raises(UserError, match=rf"irl\.{name} = .*unknown key"):
+            validate(IrlRunSettings, {"irl": {name: 1.0}})
+
+
+DESIGN = (
+    "scale",
+    "results",
+    "figures",
+    "extensions",
+    "seeds",
+    "irl_seeds",
+    "cs_rewards",
+    "methods",
+    "single_target.",
+    "multi_target.",
+    "multi_task.",
+    "ablations.",
+)
+"""Keys that say what there is and where, not how it is made."""
+
+
+@pytest.mark.parametrize("name", [name for name, _, _ in keys(Settings()) if not name.startswith(DESIGN)])
+def test_every_key_of_the_study_reaches_a_run(name: str) -> None:
+    (value,) = (one for key, _, one in keys(Settings()) if key == name)
+    changed = validate(Settings, override({}, [f"{name}={json.dumps(_another(name, value))}"]))
+    assert any(_slices(changed, experiment) != _slices(Settings(), experiment) for experiment in EXPERIMENTS)
+
+
+def _slices(settings: Settings, experiment: str) -> list[BaseModel]:
+    """The settings of one run of every kind."""
+    tasks = ("push-back", "coffee-button")  # those that most keys make an exception for
+    agents: list[BaseModel] = [expert_run(settings, task, cs) for task in tasks for cs in settings.cs_rewards]
+    agents += [run(settings, task) for run in (baseline_run, transfer_run) for task in tasks]
+    learning = [irl_run(settings, experiment, [task], method) for task in tasks for method in settings.methods]
+    shown = [demonstration_run(settings, cs) for cs in settings.cs_rewards]
+    return [*agents, *learning, *shown, score_run(settings)]
+
+
+def _another(name: str, value: Any) -> Any:
+    """A value that is allowed and is another."""
+    known = {
+        "environment.observation": "raw",
+        "sac.learner": "stable_baselines3",
+        "sac.device": "cuda",
+        "irl.schedule": "as_printed",
+        "irl.curriculum_maximum": "task",
+        "irl.logit_temperature": "as_printed",
+        "irl.logit_density": "as_printed",
+        "irl.warm_up_temperature": "as_in_irl",
+        "irl.discriminator_update": "epoch",
+        "irl.generator_update": "epoch",
+        "sac.discount": 0.5,
+        "sac.min_log_std": -3.0,
+        "evaluation.episode_steps": 100,
+        "expert.held_until": 0.5,
+    }
+    if name in known:
+        return known[name]
+    if isinstance(value, Mapping):
+        return {key: _another("", one) for key, one in value.items()}
+    if isinstance(value, tuple):
+        return [3]
+    if isinstance(value, bool):
+        return not value
+    if isinstance(value, str):
+        return 0.3
+    return value * 2 if isinstance(value, int) and value else value / 2 if value else 1

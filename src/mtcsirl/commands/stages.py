@@ -90,7 +90,8 @@ def _collect_demonstrations(verbs: Verbs) -> None:
         from mtcsirl.stages.collect_demonstrations import collect_demonstrations
         from mtcsirl.study.runs import Demonstrations, Expert
 
-        settings = run_settings(parsed, DemonstrationRunSettings, demonstration_run, "collect_demonstrations")
+        of_expert = partial(demonstration_run, cs_reward=parsed.cs_reward)
+        settings = run_settings(parsed, DemonstrationRunSettings, of_expert, "collect_demonstrations")
         shown = Demonstrations(Expert(parsed.cs_reward, parsed.task, parsed.target, parsed.seed))
         collect_demonstrations(settings, shown, parsed.expert, parsed.output, wanted=parsed.identity)
 

@@ -95,6 +95,7 @@ def register(verbs: Verbs) -> None:
 
 
 def _plan(parsed: argparse.Namespace) -> None:
+    from mtcsirl.settings.template import fallbacks
     from mtcsirl.study.plan import CALIBRATION, load_rates, plan, wall_hours
 
     settings, rates = study_settings(parsed), load_rates(parsed.rates or CALIBRATION)
@@ -108,6 +109,8 @@ def _plan(parsed: argparse.Namespace) -> None:
     _print_table(("stage", "jobs", "core-hours", "longest job, min", "memory, MiB", "disk, GiB"), lines)
     print(f"\nscale {settings.scale}: {wall_hours(stages, parsed.cores):.1f} hours on {parsed.cores} cores")
     print(f"rates measured on: {rates.machine}")
+    for note in fallbacks(settings):
+        print(note)
     if parsed.target is None:
         _print_artefacts(settings, rates)
 

@@ -140,15 +140,15 @@ def transfer_run(settings: Settings, task: str) -> AgentRunSettings:
     return sliced(run, unread("transfer"))
 
 
-def demonstration_run(settings: Settings) -> DemonstrationRunSettings:
-    """The settings of one expert's demonstrations: as many episodes as the hungriest experiment reads."""
+def demonstration_run(settings: Settings, cs_reward: str) -> DemonstrationRunSettings:
+    """The settings of the demonstrations of an expert for ``cs_reward``: as many as the hungriest experiment reads."""
     run = DemonstrationRunSettings(
         environment=settings.environment,
         episodes=max(settings.demonstrations.episodes.values()),
         episode_steps=settings.evaluation.episode_steps,
         gates=settings.gates,
     )
-    return sliced(run, unread("collect_demonstrations"))
+    return sliced(run, unread("collect_demonstrations", cs_reward=cs_reward))
 
 
 def irl_run(settings: Settings, experiment: str, tasks: Collection[str], method: str = "") -> IrlRunSettings:

@@ -16,6 +16,7 @@ Model = TypeVar("Model", bound=BaseModel)
 _OF_CS_REWARD = ("cs_weight", "curriculum", "warm_up_success", "warm_up_episodes", "warm_up_steps")
 _OF_SELECTION = ("progress.select_every", "progress.select_episodes", "progress.select_training_episodes")
 _OF_EXPERT_GATE = ("gates.expert_velocity", "gates.expert_action_norm")
+_OF_AGENT = ("sac.updates_per_step", "progress.tensorboard")
 _OF_PERCEPTRON = ("irl.discriminator.hidden_sizes", "irl.discriminator.gradient_penalty")
 _OF_BOTTLENECK = (
     "irl.discriminator.bottleneck_hidden_sizes",
@@ -48,11 +49,11 @@ def unread(stage: str, *, cs_reward: str = "", method: str = "") -> tuple[str, .
     if stage == "train_expert":
         return (*others, "gates.generator")
     if stage == "collect_demonstrations":
-        return ("environment.observation", "gates.generator")  # stored raw, seen as the expert's file says
+        return (*others, "environment.observation", "gates.generator")  # stored raw, seen as the expert's file says
     if stage == "transfer":
         return (*_OF_SELECTION, *_OF_EXPERT_GATE, "gates.generator")
     if stage == "learn_reward":
-        return (*_OF_SELECTION, *_OF_EXPERT_GATE, *METHODS.get(method, ()))
+        return (*_OF_SELECTION, *_OF_EXPERT_GATE, *_OF_AGENT, *METHODS.get(method, ()))
     return ()
 
 

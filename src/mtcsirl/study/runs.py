@@ -196,7 +196,7 @@ class Demonstrations(Run[DemonstrationRunSettings]):
 
     def settings(self, settings: Settings) -> DemonstrationRunSettings:
         """The slice of the configuration that the run depends on."""
-        return demonstration_run(settings)
+        return demonstration_run(settings, self.cs_reward)
 
 
 @dataclass(frozen=True, order=True)
