@@ -6,7 +6,8 @@ import pytest
 from mtcsirl.errors import UserError
 from mtcsirl.figures import FIGURES, figure_spec
 from mtcsirl.figures.data import FigureData
-from mtcsirl.figures.style import SMOKE_NOTE, figure_bytes
+from mtcsirl.figures.style import figure_bytes
+from mtcsirl.results.notes import SMOKE_NOTE
 from tests.figures.made_up import TARGETS
 
 CURVES = ("figure_2", "figure_3", "figure_4", "figure_5", "figure_s1", "figure_s2")

@@ -36,7 +36,7 @@ rule claims:
 rule report:
     """One page that opens in a browser: what was run, verdicts, tables, figures, gates, deviations."""
     input:
-        tables=expand("<results>/tables/{table}.{ending}", table=TABLES, ending=["csv", "md", "tex"]),
+        tables=expand("<results>/tables/{table}.{ending}", table=TABLES, ending=["csv", "json", "md", "tex"]),
         heat_maps=expand("<results>/tables/{table}.png", table=HEAT_MAPS),
         figures=expand("<figures>/{figure}.{ending}", figure=FIGURES, ending=["pdf", "png"]),
         claims=rules.claims.output,

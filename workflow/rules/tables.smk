@@ -1,4 +1,4 @@
-"""The paper's tables: targets table_1 ... table_5, each as CSV, Markdown and LaTeX."""
+"""The paper's tables: targets table_1 ... table_5, each as CSV, JSON, Markdown and LaTeX."""
 
 TABLES = [name for name in ARTEFACTS if name.startswith("table_")]
 HEAT_MAPS = ["table_1", "table_3"]  # drawn beside the paper's as well
@@ -34,6 +34,7 @@ for table in TABLES:
             code=code(f"tables/{table}.py", "results/rows.py", *["figures/heat_maps.py"][: table in HEAT_MAPS]),
         output:
             csv=f"<results>/tables/{table}.csv",
+            json=f"<results>/tables/{table}.json",
             markdown=report(
                 f"<results>/tables/{table}.md",
                 caption=f"../report/{table}.rst",

@@ -28,7 +28,7 @@ def register(verbs: Verbs) -> None:
         "table",
         _table,
         does="make one of the paper's tables",
-        writes="table_N.csv, .md, .tex (1, 3: .pdf, .png)",
+        writes="table_N.csv, .json, .md, .tex (1, 3: .pdf, .png)",
         numbered=True,
     )
     _add(verbs, "figure", _figure, does="draw one of the paper's figures", writes="figure_N.pdf, .png", numbered=True)
@@ -77,7 +77,7 @@ def _add(
 
 
 def _table(parsed: argparse.Namespace) -> None:
-    from mtcsirl.files.storage import write_csv, write_text
+    from mtcsirl.files.storage import write_csv, write_json, write_text
     from mtcsirl.results.rows import evaluation_rows
     from mtcsirl.tables import TABLES
 
@@ -87,6 +87,7 @@ def _table(parsed: argparse.Namespace) -> None:
     table = TABLES[name](rows, settings)
     folder = parsed.output or Path(settings.results) / "tables"
     write_csv(folder / f"{name}.csv", table.csv())
+    write_json(folder / f"{name}.json", table.as_json())
     write_text(folder / f"{name}.md", table.markdown())
     write_text(folder / f"{name}.tex", table.latex())
     if name in HEAT_MAPS:
@@ -115,7 +116,7 @@ def _figure(parsed: argparse.Namespace) -> None:
 
 
 def _reward_quality(parsed: argparse.Namespace) -> None:
-    from mtcsirl.figures.style import scale_notes
+    from mtcsirl.results.notes import scale_notes
     from mtcsirl.results.reward_quality import quality_markdown, read_quality
 
     settings = study_settings(parsed)
@@ -126,7 +127,7 @@ def _reward_quality(parsed: argparse.Namespace) -> None:
 
 
 def _diagnostics(parsed: argparse.Namespace) -> None:
-    from mtcsirl.figures.style import scale_notes
+    from mtcsirl.results.notes import scale_notes
     from mtcsirl.results.diagnosis import diagnoses_markdown, read_diagnoses
 
     settings = study_settings(parsed)
