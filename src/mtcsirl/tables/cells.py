@@ -74,9 +74,11 @@ class Cell:
             return "uninformative"
         return "inside" if self.prediction.contains(self.ours.mean) else "outside"
 
-    def ours_text(self, digits: int = 2, factor: float = 1.0) -> str:
-        """As in "0.86±0.05 (n=5)". ``factor`` 100 prints shares as percent."""
-        return DASH if self.ours.n == 0 else f"{_spread(self.ours, digits, digits, factor)} (n={self.ours.n})"
+    def ours_text(self, digits: int = 2, factor: float = 1.0, *, usual: int = 0) -> str:
+        """As in "0.86±0.05 (n=5)"; a ``usual`` n is left out. ``factor`` 100 prints shares as percent."""
+        if self.ours.n == 0:
+            return DASH
+        return _spread(self.ours, digits, digits, factor) + (f" (n={self.ours.n})" if self.ours.n != usual else "")
 
     def paper_text(self, digits: int = 2, factor: float = 1.0) -> str:
         """As in "0.73±0.07"; spreads keep the two digits that the paper prints: its smallest, 0.01 %, is not 0."""

@@ -50,7 +50,7 @@ def cross_transfer_table(
     ]
     layout = Layout(
         "reward learned on",
-        tuple(Quantity(task) for task in tasks),
+        tuple(Quantity(task, usual=len(settings.seeds)) for task in tasks),
         (("", body),) if cs_reward in settings.cs_rewards else (),
     )
     papers = published.data[RATIO_TABLES[cs_reward]]["tasks"]
@@ -71,7 +71,7 @@ def _caption(cs_reward: str, target: float, settings: Settings) -> str:
         f"({target:g}); closer to 1 is better. Rows: the task on whose {_targets(seen)} MT-CSIRL learned the "
         "reward; "
         f"columns: the task on whose target {EVALUATION_TARGET}, {new}, a new agent was trained and evaluated. "
-        "Mean±std over n seeds, and the paper's mean."
+        f"Mean±std over n = {len(settings.seeds)} seeds where no other n is printed, and the paper's mean."
     )
 
 

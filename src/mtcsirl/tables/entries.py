@@ -18,6 +18,7 @@ class Quantity:
     """What two neighbouring columns show, ours and the paper's; not ``published``: one column, ours.
 
     ``factor`` 100 prints shares as percent. ``same_agents``: as the quantity to its left, where their marks stand.
+    ``usual``: the number of seeds that is not printed in every cell, for tables too wide for it.
     """
 
     title: str
@@ -25,6 +26,7 @@ class Quantity:
     digits: int = 2
     factor: float = 1.0
     same_agents: bool = False
+    usual: int = 0
 
 
 @dataclass(frozen=True)
@@ -133,7 +135,7 @@ class Layout:
             signs = [SIGNS[cell.comparison]] if predicted else []
             signs += [] if one.same_agents else [f"{MARKS[kind]}{count}" for kind, count in cell.marks.items()]
             strong += [len(texts)] if entry.strong else []
-            texts.append(" ".join([cell.ours_text(one.digits, one.factor), *filter(None, signs)]))
+            texts.append(" ".join([cell.ours_text(one.digits, one.factor, usual=one.usual), *filter(None, signs)]))
             texts += [cell.paper_text(one.digits, one.factor)] if one.published else []
         return texts, strong
 
