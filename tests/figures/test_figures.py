@@ -84,6 +84,16 @@ def test_missing_runs_are_named_and_the_rest_is_drawn(data):
     assert any(line.get_label() == "Transferred" for line in figure.axes[0].lines)
 
 
+def test_figure_3_names_the_tasks_of_an_incomplete_mean(data):
+    gone = (data.curves["stage"] == "transfer") & (data.curves["task"] != "push-back")
+    partial = FigureData(settings=data.settings, curves=data.curves[~gone], scores=data.scores, points=data.points)
+    assert "(b) mean over the tasks that are there – MT-CSIRL: push-back" in texts(
+        figure_spec("figure_3").draw(partial)
+    )
+    assert "mean over the tasks" not in texts(figure_spec("figure_3").draw(data))
+    assert "the unseen test task" in figure_spec("figure_3").caption(data), "the paper's shows one task"
+
+
 def test_task_of_each_figure_is_the_papers(data):
     named = {name: figure_spec(name).caption(data) for name in CURVES if name != "figure_3"}
     tasks = ("reach-wall", "button-press-topdown-wall", "coffee-button", "drawer-close", "push-back")

@@ -127,8 +127,8 @@ def _reward_quality(parsed: argparse.Namespace) -> None:
 
 
 def _diagnostics(parsed: argparse.Namespace) -> None:
-    from mtcsirl.results.notes import scale_notes
     from mtcsirl.results.diagnosis import diagnoses_markdown, read_diagnoses
+    from mtcsirl.results.notes import scale_notes
 
     settings = study_settings(parsed)
     runs = _there(design(settings).irl_runs, settings, "gate.json", parsed.partial)
