@@ -41,7 +41,7 @@ rule report:
         figures=expand("<figures>/{figure}.{ending}", figure=FIGURES, ending=["pdf", "png"]),
         claims=rules.claims.output,
         provenance=[path for run in STUDY for path in files(run, "provenance.json")],
-        page=multiext(str(PACKAGE / "report/page"), ".html", ".css"),
+        page=multiext(str(PACKAGE / "report/page"), ".html", ".css", ".js"),
         code=code("report"),
     output:
         report(
