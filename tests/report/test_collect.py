@@ -186,4 +186,7 @@ def test_what_a_claim_measured_is_one_line():
     assert measured(one) == "part closed: velocity 0.84 [0.80, 0.88], action norm 0.90"
     several = [unit("velocity", 0.6, 0.5, 0.7), unit("velocity", 0.8, 0.75, 0.93), unit("velocity", None, None, None)]
     assert measured(several) == "part closed: velocity 0.60 to 0.80 [0.50, 0.93] (2 units)"
+    assert measured([unit("velocity", 0.051, -0.001, 0.06), unit("velocity", 0.049, 0.0, 0.07)]) == (
+        "part closed: velocity 0.05 [0.00, 0.07] (2 units)"
+    )
     assert measured([unit("velocity", None, None, None)]) == measured([]) == measured([{}]) == "nothing measured yet"

@@ -31,9 +31,14 @@ def _measure(unit: Mapping[str, Any]) -> Mapping[str, Any]:
 def _values(measures: Sequence[Mapping[str, Any]]) -> str:
     values = [measure["value"] for measure in measures]
     lows, highs = _numbers(measures, "low"), _numbers(measures, "high")
-    span = f"{values[0]:.2f}" if len(values) == 1 else f"{min(values):.2f} to {max(values):.2f}"
-    interval = f" [{min(lows):.2f}, {max(highs):.2f}]" if lows and highs else ""
+    span = " to ".join(dict.fromkeys([_number(min(values)), _number(max(values))]))
+    interval = f" [{_number(min(lows))}, {_number(max(highs))}]" if lows and highs else ""
     return f"{span}{interval}" + (f" ({len(values)} units)" if len(values) > 1 else "")
+
+
+def _number(value: float) -> str:
+    """Two digits; what rounds to zero has no sign."""
+    return f"{round(value, 2) + 0.0:.2f}"
 
 
 def _numbers(measures: Iterable[Mapping[str, Any]], name: str) -> list[float]:

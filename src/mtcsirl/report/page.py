@@ -21,8 +21,8 @@ VERDICTS = {
 }
 """Verdict and its style; the words stand beside the colour."""
 CONFIGS = {"smoke": "--configfile config/smoke.yaml ", "paper": "--configfile config/paper.yaml "}
-NOTE_KINDS: dict[str, tuple[Kind, ...]] = {"beside": ("scale", "gap", "mark"), "below": ("remark", "deviation")}
-"""Notes that are read with a table, and those that are unfolded."""
+BESIDE: tuple[Kind, ...] = ("scale", "gap", "mark")
+"""Notes that are read with a table; remarks are unfolded, and deviations have a section of their own."""
 
 
 def build_report(data: ReportData) -> str:
@@ -46,7 +46,8 @@ def build_report(data: ReportData) -> str:
         verdict_counts=_verdict_counts(data),
         unit_columns=COLUMNS,
         warnings=scale_notes(data.run.scale),
-        notes=lambda table, where: of_kind(table.notes, *NOTE_KINDS[where]),
+        beside=lambda notes: of_kind(notes, *BESIDE),
+        of_kind=of_kind,
         command=f"snakemake --cores 2 {CONFIGS.get(data.run.scale, '')}",
     )
 
