@@ -129,7 +129,8 @@ class Layout:
 
     def _texts(self, row: Row) -> tuple[list[str], list[int]]:
         """The texts of a row and which of them are bold."""
-        texts, strong = [], []
+        texts: list[str] = []
+        strong: list[int] = []
         for entry, one, predicted in zip(row.entries, self.quantities, self.predicted, strict=True):
             cell = entry.cell
             signs = [SIGNS[cell.comparison]] if predicted else []
@@ -140,7 +141,7 @@ class Layout:
         return texts, strong
 
     def _interval_texts(self, row: Row) -> tuple[list[str], list[int]]:
-        texts = []
+        texts: list[str] = []
         for entry, one, predicted in zip(row.entries, self.quantities, self.predicted, strict=True):
             texts.append(entry.cell.interval_text(one.digits, one.factor))
             texts += [entry.cell.prediction_text(one.factor)] if predicted else []
