@@ -133,7 +133,7 @@ def test_missing_artefact_is_an_error_unless_partial(results):
     settings, root = results
     storage.remove(root / "figures" / "figure_3.png")
     try:
-        with pytest.raises(UserError, match=r"figure_3\.png: not there; make it with `snakemake figure_3`"):
+        with pytest.raises(UserError, match=r"figure_3\.png: not there"):
             collect(settings, root / "page.html")
         data = collect(settings, root / "page.html", partial=True)
         assert [name for name, _ in data.missing] == ["figure_3"]

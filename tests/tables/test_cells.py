@@ -3,7 +3,7 @@ import pandas as pd
 import pytest
 
 from mtcsirl.results.statistics import Summary
-from mtcsirl.tables.cells import extreme_ratio, make_cell
+from mtcsirl.tables.cells import MARK_TEXTS, MARKS, extreme_ratio, make_cell
 
 UNKNOWN = Summary(np.nan, np.nan, 0)
 
@@ -15,8 +15,8 @@ def rows(values, status="ok", tasks=("push-back",), metric="velocity"):
         for task, value in zip(tasks, row, strict=True):
             state = status if isinstance(status, str) else status[seed]
             for policy, shift in (("stochastic", 0.0), ("deterministic", -0.1)):
-                table.append({"seed": seed, "task": task, "policy": policy, "metric": metric,
-                              "value": value + shift, "status": state})  # fmt: skip
+                table.append({"seed": seed, "task": task, "policy": policy, "kept": "kept", "metric": metric,
+                              "value": value + shift, "status": state, "diverged": 0})  # fmt: skip
     return pd.DataFrame(table)
 
 
@@ -99,17 +99,19 @@ def test_missing_doubtful_and_gated_agents_are_marked():
     assert cell.ours_text() == "0.50±0.28 (n=2)"
 
 
-def test_incomplete_evaluations_and_diverged_simulations_are_marked():
-    frame = pd.concat([rows([[0.7], [np.nan], [0.8]], ["ok", "incomplete", "ok"]),
-                       rows([[0.0], [0.0], [0.2]], metric="diverged")])  # fmt: skip
+def test_what_is_left_out_and_what_diverged_is_marked():
+    status = ["ok", "incomplete", "stale", "ok"]
+    frame = rows([[0.7], [np.nan], [np.nan], [0.8]], status)
+    frame.loc[frame["seed"] == 3, "diverged"] = 2
     cell = make_cell(frame, "velocity", UNKNOWN)
-    assert cell.marks == {"incomplete": 1, "diverged": 1}
+    assert cell.marks == {"incomplete": 1, "stale": 1, "diverged": 1}, "agents, not episodes"
     assert cell.ours.n == 2
-    assert make_cell(frame[frame["metric"] == "velocity"], "velocity", UNKNOWN).marks == {"incomplete": 1}
+    assert set(cell.marks) < set(MARKS) == set(MARK_TEXTS)
+    assert make_cell(frame.assign(diverged=0), "velocity", UNKNOWN).marks == {"incomplete": 1, "stale": 1}
 
 
 def test_the_kept_policy_is_the_one_that_is_shown():
-    both = pd.concat([rows([[0.7], [0.8]]).assign(kept="kept"), rows([[0.1], [0.2]]).assign(kept="last")])
+    both = pd.concat([rows([[0.7], [0.8]]), rows([[0.1], [0.2]]).assign(kept="last")])
     assert make_cell(both, "velocity", UNKNOWN).ours.mean == pytest.approx(0.75)
 
 

@@ -35,7 +35,7 @@ def rows_of(settings, name, results):
     """Rows of a study of which all runs are there, half or none."""
     study = design(settings, name)
     if results == "none" or not [run for run in study if hasattr(run, "seed")]:
-        return evaluation_rows(study, settings.results, partial=True)
+        return evaluation_rows(study, settings, partial=True)
     rows = evaluation(study, lambda agent: {}, spread=0.05)
     if results == "half":
         gone = np.arange(len(rows)) % 7 < 4

@@ -10,7 +10,8 @@ from typing import Any, Literal
 
 import pandas as pd
 
-from mtcsirl.episodes.evaluation import COLUMNS, Row, metric_limit, relative_distance
+from mtcsirl.episodes.evaluation import COLUMNS, Row
+from mtcsirl.episodes.gates import metric_limit, relative_distance
 from mtcsirl.episodes.policy import Policy, save_policy
 from mtcsirl.errors import UserError
 from mtcsirl.files import storage

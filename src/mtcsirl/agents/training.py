@@ -20,11 +20,13 @@ from mtcsirl.agents.learners import make_learner
 from mtcsirl.agents.progress import Progress
 from mtcsirl.agents.replay import Replay
 from mtcsirl.agents.scripted import ScriptedExplorers
-from mtcsirl.episodes.evaluation import gate_verdict, measure_episode, stochastic_means
+from mtcsirl.episodes.evaluation import measure_episode
+from mtcsirl.episodes.gates import gate_verdict, stochastic_means
 from mtcsirl.episodes.lockstep import TaskEnvironments, make_environments
 from mtcsirl.episodes.policy import Policy
-from mtcsirl.files import storage
+from mtcsirl.files import stop
 from mtcsirl.files.checkpoint import load_checkpoint, prefixed, save_checkpoint, without_prefix
+from mtcsirl.files.provenance import Stopwatch
 from mtcsirl.rewards.mixture import PolicyReward
 from mtcsirl.worlds.environments import ACTION_SIZE
 
@@ -32,20 +34,27 @@ from mtcsirl.worlds.environments import ACTION_SIZE
 def train_agents(
     jobs: Sequence[AgentJob],
     *,
-    checkpoint: Path | str | None = None,
+    checkpoints: Sequence[Path] | None = None,
+    runs: Sequence[str] | None = None,
+    stopwatch: Stopwatch | None = None,
     log: Callable[[str], None] = print,
     events: Path | str | None = None,
     workers: int = 0,
 ) -> list[TrainedAgent]:
     """Train these agents in lockstep and evaluate them; one job is the ordinary case.
 
-    checkpoint: file to resume from and to save to; removed at the end. events: folder for TensorBoard event files.
-    workers: processes that step the environments and evaluate, 0 for none.
+    checkpoint: file to resume from and to save to; the caller removes it when all results stand. run: what the result
+    depends on beside the jobs (the code): a checkpoint of another run is not taken up. stopwatch: learns what earlier
+    tries spent. events: folder for TensorBoard event files. workers: processes that step the environments and evaluate,
+    0 for none.
 
     Raises UserError when the jobs differ in more than task, target, seed, reward scale, cs_weight, curriculum or
     scripted steps.
     """
-    training = Training(jobs, checkpoint=checkpoint, log=log, events=events, workers=workers)
+    checkpoint, run = (checkpoints[0] if checkpoints else None), (runs[0] if runs else "")
+    training = Training(
+        jobs, checkpoint=checkpoint, run=run, stopwatch=stopwatch, log=log, events=events, workers=workers
+    )
     try:
         training.run()
         return training.finish()
@@ -61,6 +70,8 @@ class Training:
         jobs: Sequence[AgentJob],
         *,
         checkpoint: Path | str | None = None,
+        run: str = "",
+        stopwatch: Stopwatch | None = None,
         log: Callable[[str], None] = print,
         events: Path | str | None = None,
         workers: int = 0,
@@ -81,6 +92,8 @@ class Training:
         self._best: list[tuple[tuple[float, float, float], Policy] | None] = [None] * len(jobs)
         self._curves: list[list[tuple[int, str, float]]] = [[] for _ in jobs]
         self._checkpoint = None if checkpoint is None else Path(checkpoint)
+        self._run = " ".join((run, *(job.fingerprint() for job in jobs)))
+        self._stopwatch = stopwatch or Stopwatch()
         tasks = [(job.task, job.target) for job in jobs]
         self.environments: TaskEnvironments = make_environments(tasks, self.settings.environment, workers)
         self._scripted = ScriptedExplorers(
@@ -95,9 +108,10 @@ class Training:
         self._progress = Progress(self.settings.steps, log, events)
         self._log = log
 
+    @stop.deferred()
     def run(self) -> None:
-        """Train until the budget ends, from the checkpoint if there is one."""
-        if self._checkpoint is not None and self._checkpoint.is_file():
+        """Train until the budget ends, from the checkpoint if there is one; stopped, it ends with its episode."""
+        if self._checkpoint is not None:
             self._resume(self._checkpoint)
         self._progress.start(self.step)
         while self.step < self.settings.steps:
@@ -108,8 +122,10 @@ class Training:
                 last or self._crossed(started, self.settings.progress.select_every)
             ):
                 self._try_policies()
-            if self._checkpoint is not None and self._crossed(started, self.settings.progress.checkpoint_every):
+            due = stop.requested() or self._crossed(started, self.settings.progress.checkpoint_every)
+            if self._checkpoint is not None and due:
                 self._save(self._checkpoint)
+                stop.stop_here(f"step {self.step}")
 
     def finish(self) -> list[TrainedAgent]:
         """Evaluate what was kept and judge it by the gates."""
@@ -121,8 +137,6 @@ class Training:
             gate = gate_verdict(job.gate, stochastic_means(rows), job.cs_reward, self.settings.gates)
             frame = pd.DataFrame(curve, columns=["step", "metric", "value"])
             trained.append(TrainedAgent(job, policy, frame, rows, gate))
-        if self._checkpoint is not None:
-            storage.remove(self._checkpoint)
         return trained
 
     def close(self) -> None:
@@ -248,7 +262,7 @@ class Training:
             if best is not None:
                 tensors |= prefixed(f"best/{agent}", best[1].tensors())
         notes = {
-            "jobs": [job.fingerprint() for job in self.jobs],
+            "spent": self._stopwatch.read(),
             "step": self.step,
             "random": self._random.bit_generator.state,
             "recent": self._recent,
@@ -256,13 +270,14 @@ class Training:
             "curves": self._curves,
             "scores": [None if best is None else best[0] for best in self._best],
         }
-        save_checkpoint(file, tensors, notes)
+        save_checkpoint(file, tensors, notes, run=self._run)
 
     def _resume(self, file: Path) -> None:
-        tensors, notes = load_checkpoint(file)
-        if notes["jobs"] != [job.fingerprint() for job in self.jobs]:
-            self._log(f"{file}: saved by a run with other settings; starting from the beginning")
+        found = load_checkpoint(file, run=self._run)
+        if found is None:
             return
+        tensors, notes = found
+        self._stopwatch.add(notes["spent"])
         self.learner.load_state_dict(without_prefix("learner", tensors))
         self.replay.load_state_dict(without_prefix("replay", tensors))
         if self._reward.curriculum is not None:

@@ -17,9 +17,9 @@ from mtcsirl.figures.style import (
     styled,
     target_of,
 )
+from mtcsirl.names import EVALUATION_TARGET
 from mtcsirl.settings.runs import irl_run
 from mtcsirl.study.design import design
-from mtcsirl.study.runs import EVALUATION_TARGET
 
 EXPERIMENT, METHOD = "single_target", "mt_csirl"
 SCATTER_CS_REWARD = "velocity"

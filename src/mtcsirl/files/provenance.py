@@ -58,20 +58,26 @@ def _versions() -> dict[str, str]:
 
 
 class Stopwatch:
-    """Wall seconds, CPU seconds and peak memory since it was made; ``spent`` carries what earlier tries used."""
+    """Wall seconds, CPU seconds and peak memory of a run: since it was made, and of the tries before."""
 
-    def __init__(self, spent: dict[str, float] | None = None) -> None:
+    def __init__(self) -> None:
         self._wall = time.monotonic()
         self._cpu = time.process_time()
-        self._spent = spent or {"wall_seconds": 0.0, "cpu_seconds": 0.0}
+        self._before = {"wall_seconds": 0.0, "cpu_seconds": 0.0, "peak_memory_mib": 0.0}
+
+    def add(self, spent: Mapping[str, float]) -> None:
+        """Count what `read` gave an earlier try; a checkpoint carries it to the next."""
+        for name in ("wall_seconds", "cpu_seconds"):
+            self._before[name] += spent[name]
+        self._before["peak_memory_mib"] = max(self._before["peak_memory_mib"], spent["peak_memory_mib"])
 
     def read(self, agents: int = 1) -> dict[str, float]:
-        """The cost so far, resumed tries included; time is shared by ``agents`` runs."""
+        """The cost so far, earlier tries included; time is shared by ``agents`` runs."""
         peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
         return {
-            "wall_seconds": round((self._spent["wall_seconds"] + time.monotonic() - self._wall) / agents, 3),
-            "cpu_seconds": round((self._spent["cpu_seconds"] + time.process_time() - self._cpu) / agents, 3),
-            "peak_memory_mib": round(peak, 1),
+            "wall_seconds": round((self._before["wall_seconds"] + time.monotonic() - self._wall) / agents, 3),
+            "cpu_seconds": round((self._before["cpu_seconds"] + time.process_time() - self._cpu) / agents, 3),
+            "peak_memory_mib": round(max(peak, self._before["peak_memory_mib"]), 1),
         }
 
 

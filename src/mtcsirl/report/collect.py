@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from mtcsirl.errors import UserError
+from mtcsirl.errors import MissingError
 from mtcsirl.figures import figure_spec
 from mtcsirl.figures.style import caption_of
 from mtcsirl.files import storage
@@ -25,7 +25,7 @@ from mtcsirl.settings import Settings
 from mtcsirl.settings.template import deviations
 from mtcsirl.study.design import ARTEFACTS, design
 from mtcsirl.study.outputs import OUTPUTS
-from mtcsirl.study.runs import Run, Study
+from mtcsirl.study.runs import AnyRun, Study
 from mtcsirl.tables.table import Table
 
 SUMMARY_TARGETS = {"claims": "the verdicts on all claims", "report": "this page", "all": "everything"}
@@ -42,7 +42,7 @@ def collect(settings: Settings, page: Path, *, partial: bool = False) -> ReportD
     missing = [(name, _title(name)) for name in ARTEFACTS if not _picture_or_table(name, settings).is_file()]
     if missing and not partial:
         path = _picture_or_table(missing[0][0], settings)
-        raise UserError(f"{path}: not there; make it with `snakemake {missing[0][0]}`, or ask for --partial results")
+        raise MissingError(f"{path}: not there")
     there = [name for name in ARTEFACTS if name not in dict(missing)]
     return ReportData(
         run=_what_was_run(settings, study, provenance),
@@ -112,7 +112,7 @@ def _links(page: Path, files: tuple[tuple[str, Path], ...]) -> tuple[tuple[str, 
     return tuple((text, Path(os.path.relpath(file, page.parent)).as_posix()) for text, file in files if file.is_file())
 
 
-def _targets(settings: Settings, study: Study, provenance: dict[Run, dict[str, Any]]) -> Iterator[TargetLine]:
+def _targets(settings: Settings, study: Study, provenance: dict[AnyRun, dict[str, Any]]) -> Iterator[TargetLine]:
     """Every artefact with the cost of the runs that it needs, as measured; artefacts share runs."""
     wanted = {name: (_title(name), design(settings, name)) for name in ARTEFACTS}
     for name, (text, own) in (wanted | {name: (text, study) for name, text in SUMMARY_TARGETS.items()}).items():
@@ -120,7 +120,7 @@ def _targets(settings: Settings, study: Study, provenance: dict[Run, dict[str, A
         yield TargetLine(name, text, len(costs), sum(own.jobs().values()), sum(costs))
 
 
-def _what_was_run(settings: Settings, study: Study, provenance: dict[Run, dict[str, Any]]) -> WhatWasRun:
+def _what_was_run(settings: Settings, study: Study, provenance: dict[AnyRun, dict[str, Any]]) -> WhatWasRun:
     return WhatWasRun(
         scale=settings.scale,
         seeds=settings.seeds,
@@ -131,7 +131,7 @@ def _what_was_run(settings: Settings, study: Study, provenance: dict[Run, dict[s
     )
 
 
-def _json(run: Run, settings: Settings, name: str) -> dict[str, Any] | None:
+def _json(run: AnyRun, settings: Settings, name: str) -> dict[str, Any] | None:
     path = Path(settings.results) / run.folder / name
     return storage.read_json(path) if path.is_file() else None
 
@@ -140,7 +140,7 @@ def _machine(found: dict[str, Any]) -> str:
     return f"{found['processor']}, {found['cores']} cores, {found['system']}, Python {found['python']}"
 
 
-def _stage_cost(stage: str, study: Study, provenance: dict[Run, dict[str, Any]]) -> StageCost:
+def _stage_cost(stage: str, study: Study, provenance: dict[AnyRun, dict[str, Any]]) -> StageCost:
     costs = [found["cost"] for run, found in provenance.items() if run.stage == stage]
     return StageCost(
         stage=stage,
@@ -179,12 +179,12 @@ def _gates(study: Study, results: Path) -> tuple[GateLine, ...]:
     return tuple(_gate_line(key, gates) for key, gates in groups.items())
 
 
-def _members(run: Run, gate: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
+def _members(run: AnyRun, gate: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
     if "members" in gate:
         for verdict in gate["members"]:
             yield verdict["task"], verdict
     else:
-        yield run.task, gate  # type: ignore[union-attr]
+        yield str(run.key["task"]), gate
 
 
 AGENT_NAMES = {
@@ -196,14 +196,14 @@ AGENT_NAMES = {
 }
 
 
-def _agent_name(run: Run) -> str:
+def _agent_name(run: AnyRun) -> str:
     """As in ``transfer agent, multi_task, mt_csirl``."""
     irl = getattr(run, "irl", run)
     parts = [AGENT_NAMES[run.stage], *(getattr(irl, name, "") for name in ("experiment", "method"))]
     return ", ".join(part.replace("_", " ") for part in parts if part)
 
 
-def _cs_reward(run: Run) -> str:
+def _cs_reward(run: AnyRun) -> str:
     return str(getattr(getattr(run, "irl", run), "cs_reward", ""))
 
 

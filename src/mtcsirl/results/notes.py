@@ -54,6 +54,13 @@ def remarks(texts: Iterable[str]) -> tuple[Note, ...]:
     return tuple(Note("remark", text) for text in texts)
 
 
+def lacks_notes(lacks: Iterable[tuple[str, str]], shown: int = 3) -> tuple[Note, ...]:
+    """What unusable runs lack, (folder, what) each; the first ``shown`` in words."""
+    found = sorted({(folder, what) for folder, what in lacks if what})
+    rest = (f"and {len(found) - shown} more runs: mtcsirl status",) if len(found) > shown else ()
+    return tuple(Note("gap", text) for text in (*(f"{folder}: {what}" for folder, what in found[:shown]), *rest))
+
+
 def left_out(
     what: str, papers: Iterable[str], ours: Iterable[str], label: Callable[[str], str] = lambda name: name
 ) -> tuple[Note, ...]:

@@ -7,7 +7,9 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
-from mtcsirl.results.rows import BELOW_GATE, DUPLICATED, FOREIGN, MISSING, matrix, select
+from mtcsirl.names import KEPT
+from mtcsirl.results.notes import Note, lacks_notes
+from mtcsirl.results.rows import BELOW_GATE, DUPLICATED, FOREIGN, INCOMPLETE, MISSING, STALE, matrix, select
 from mtcsirl.results.statistics import (
     UNKNOWN,
     Estimate,
@@ -25,17 +27,14 @@ PAPER_DIGITS = 2
 RESAMPLES = 500
 EXTREME = 0.999
 """Two spreads whose ratio of variances lies beyond this quantile of F are no spreads of the same kind."""
-INCOMPLETE, DIVERGED = "incomplete", "diverged"
-"""Status of an agent whose evaluation lacks numbers; metric (share of episodes) of one whose simulation diverged."""
-KEPT = "kept"
-"""Column of the rows that says which policy of a training they are about, and the policy that tables show."""
-MARKS = {"below": "†", "missing": "‡", "doubtful": "§", "incomplete": "¶", "diverged": "×"}
+MARKS = {"below": "†", "missing": "‡", "doubtful": "§", "incomplete": "¶", "stale": "‖", "diverged": "×"}
 """Doubt about agents, printed with their number."""
 MARK_TEXTS = {
     "below": "† agents below their gate; they count in the mean",
     "missing": "‡ missing agents",
     "doubtful": "§ agents left out: the evaluation repeats another seed's, or names another run than its folder",
     "incomplete": "¶ agents left out: their evaluation lacks episodes or numbers",
+    "stale": "‖ agents left out: made with other settings, code or inputs than the study's",
     "diverged": "× agents with episodes in which the simulation diverged",
 }
 Comparison = Literal["", "inside", "outside", "uninformative"]
@@ -115,6 +114,12 @@ class Cell:
         }
 
 
+def unusable(rows: pd.DataFrame) -> tuple[Note, ...]:
+    """What incomplete agents lack and why stale ones are stale, by their folders."""
+    found = select(rows, status=(INCOMPLETE, STALE))[["folder", "lacks"]].drop_duplicates()
+    return lacks_notes(found.itertuples(index=False, name=None))
+
+
 def extreme_ratio(first: Summary, second: Summary, quantile: float = EXTREME) -> bool:
     """Whether s1^2 / s2^2 (the larger above) lies beyond the ``quantile`` of F(n1 - 1, n2 - 1).
 
@@ -134,7 +139,7 @@ def make_cell(rows: pd.DataFrame, metric: str, paper: Summary, scale: float = 1.
     Episodes were averaged per run; here tasks are averaged per seed, then seeds. ``paper`` is in units of the result; a
     printed spread of 0 predicts nothing. Rows without ``metric`` give an empty cell of which no agent is expected.
     """
-    rows = select(rows, kept=KEPT) if KEPT in rows else rows
+    rows = select(rows, kept=KEPT)
     chosen = select(rows, metric=metric, policy="stochastic")
     ours = summarise(per_seed(chosen) / scale)
     greedy = per_seed(select(rows, metric=metric, policy="deterministic")) / scale
@@ -146,20 +151,20 @@ def make_cell(rows: pd.DataFrame, metric: str, paper: Summary, scale: float = 1.
         deterministic=summarise(greedy).mean,
         iqm=_interquartile(chosen, scale),
         expected=chosen["seed"].nunique(),
-        marks=_marks(rows, chosen),
+        marks=_marks(chosen),
     )
 
 
-def _marks(rows: pd.DataFrame, chosen: pd.DataFrame) -> dict[str, int]:
-    """Agents in doubt by kind, none that are 0. ``rows``: of all metrics; ``chosen``: one row per agent."""
-    status = chosen["status"]
-    diverged = select(rows, metric=DIVERGED, policy="stochastic")
+def _marks(rows: pd.DataFrame) -> dict[str, int]:
+    """Agents in doubt by kind, none that are 0; ``rows``: one per agent."""
+    status = rows["status"]
     counts = {
         "below": (status == BELOW_GATE).sum(),
         "missing": (status == MISSING).sum(),
         "doubtful": status.isin([DUPLICATED, FOREIGN]).sum(),
         "incomplete": (status == INCOMPLETE).sum(),
-        "diverged": (diverged["value"] > 0).sum(),
+        "stale": (status == STALE).sum(),
+        "diverged": (rows["diverged"] > 0).sum(),
     }
     return {kind: int(count) for kind, count in counts.items() if count}
 

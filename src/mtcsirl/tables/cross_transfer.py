@@ -2,12 +2,12 @@
 
 import pandas as pd
 
+from mtcsirl.names import EVALUATION_TARGET
 from mtcsirl.results.notes import left_out, remarks
 from mtcsirl.results.published import RATIO_TABLES, Published
 from mtcsirl.results.rows import select
 from mtcsirl.settings import Settings
-from mtcsirl.study.runs import EVALUATION_TARGET
-from mtcsirl.tables.cells import Cell, make_cell
+from mtcsirl.tables.cells import Cell, make_cell, unusable
 from mtcsirl.tables.entries import Entry, Layout, Quantity, Row, result_table
 from mtcsirl.tables.table import Table
 
@@ -55,6 +55,7 @@ def cross_transfer_table(
     )
     papers = published.data[RATIO_TABLES[cs_reward]]["tasks"]
     notes = (
+        *unusable(rows),
         *left_out("cs-reward", [cs_reward], settings.cs_rewards, label=_words),
         *left_out("tasks", papers, tasks),
         *remarks([REMARK]),

@@ -2,13 +2,12 @@
 
 import pandas as pd
 
-from mtcsirl.figures.style import look
+from mtcsirl.names import EVALUATION_TARGET, agent_label, distance_metric
 from mtcsirl.results.notes import left_out, remarks
 from mtcsirl.results.published import PAPER_ORDER, UNKNOWN, Published, in_paper_order, load_published
 from mtcsirl.results.rows import select
 from mtcsirl.settings import Settings
-from mtcsirl.study.runs import EVALUATION_TARGET
-from mtcsirl.tables.cells import Cell, make_cell
+from mtcsirl.tables.cells import Cell, make_cell, unusable
 from mtcsirl.tables.entries import Entry, Layout, Quantity, Row, result_table
 from mtcsirl.tables.table import Table
 
@@ -58,11 +57,11 @@ def table_2(rows: pd.DataFrame, settings: Settings, published: Published | None 
     sections = []
     for cs in in_paper_order(settings.cs_rewards):
         name = cs.replace("_", " ")
-        columns = {cs: f"{name}: average {name}", f"{cs}_distance": f"{name}: mean distance from the target",
+        columns = {cs: f"{name}: average {name}", distance_metric(cs): f"{name}: mean distance from the target",
                    "success": f"{name}: success rate (%)"}  # fmt: skip
         body = [
             Row(
-                look(agent).label,
+                agent_label(agent),
                 tuple(
                     Entry(agent_cell(rows, settings, published, agent, cs, metric), column, metric)
                     for metric, column in columns.items()
@@ -72,7 +71,8 @@ def table_2(rows: pd.DataFrame, settings: Settings, published: Published | None 
         ]
         sections.append((f"{name}, target τ = {published.target(cs):g}", body))
     notes = (
-        *left_out("methods", published.data["table_2"]["rows"], agents, label=lambda agent: look(agent).label),
+        *unusable(rows),
+        *left_out("methods", published.data["table_2"]["rows"], agents, label=agent_label),
         *left_out("cs-reward", PAPER_ORDER, settings.cs_rewards, label=lambda name: name.replace("_", " ")),
         *remarks(REMARKS),
     )

@@ -2,11 +2,12 @@
 
 import pandas as pd
 
+from mtcsirl.names import agent_label
 from mtcsirl.results.notes import left_out, remarks
 from mtcsirl.results.published import PAPER_ORDER, Published, in_paper_order, load_published
 from mtcsirl.results.rows import select
 from mtcsirl.settings import Settings
-from mtcsirl.tables.cells import Cell, make_cell
+from mtcsirl.tables.cells import Cell, make_cell, unusable
 from mtcsirl.tables.entries import Entry, Layout, Quantity, Row, result_table
 from mtcsirl.tables.table import Table
 
@@ -51,7 +52,8 @@ def table_4(rows: pd.DataFrame, settings: Settings, published: Published | None 
         ]
         sections.append((f"{name}, target {published.target(cs):g}", body))
     notes = (
-        *left_out("method", ["mt_csirl_lt"], settings.methods, label=lambda name: "MT-CSIRL+LT"),
+        *unusable(rows),
+        *left_out("method", ["mt_csirl_lt"], settings.methods, label=agent_label),
         *left_out("tasks", published.data["table_4"]["rows"], settings.multi_task.train_tasks),
         *left_out("cs-reward", PAPER_ORDER, settings.cs_rewards, label=lambda name: name.replace("_", " ")),
         *remarks([REMARK]),
