@@ -29,7 +29,7 @@ def register(verbs: Verbs) -> None:
         "table",
         _table,
         does="make one of the paper's tables",
-        writes="table_N.csv, .md, .tex (1, 3: .pdf, .png)",
+        writes="table_N.csv, .json, .md, .tex (1, 3: .pdf, .png)",
         numbered=True,
     )
     _add(verbs, "figure", _figure, does="draw one of the paper's figures", writes="figure_N.pdf, .png", numbered=True)
@@ -85,7 +85,7 @@ def _target(parsed: argparse.Namespace) -> str:
 
 
 def _table(parsed: argparse.Namespace) -> None:
-    from mtcsirl.files.storage import write_csv, write_text
+    from mtcsirl.files.storage import write_csv, write_json, write_text
     from mtcsirl.results.rows import evaluation_rows
     from mtcsirl.tables import TABLES
 
@@ -96,6 +96,7 @@ def _table(parsed: argparse.Namespace) -> None:
     home = Path(settings.results) / "tables"
     folder = parsed.output or home
     write_csv(folder / f"{name}.csv", table.csv())
+    write_json(folder / f"{name}.json", table.as_json())
     write_text(folder / f"{name}.md", table.markdown())
     write_text(folder / f"{name}.tex", table.latex())
     if name in HEAT_MAPS:
@@ -138,7 +139,7 @@ def _sign(parsed: argparse.Namespace, settings: Settings, name: str, home: Path,
 
 
 def _reward_quality(parsed: argparse.Namespace) -> None:
-    from mtcsirl.figures.style import scale_notes
+    from mtcsirl.results.notes import scale_notes
     from mtcsirl.results.reward_quality import quality_markdown, read_quality
 
     settings = study_settings(parsed)
@@ -151,8 +152,8 @@ def _reward_quality(parsed: argparse.Namespace) -> None:
 
 
 def _diagnostics(parsed: argparse.Namespace) -> None:
-    from mtcsirl.figures.style import scale_notes
     from mtcsirl.results.diagnosis import diagnoses_markdown, read_diagnoses
+    from mtcsirl.results.notes import scale_notes
 
     settings = study_settings(parsed)
     runs = _there(design(settings).irl_runs, settings, parsed.partial)
