@@ -52,24 +52,38 @@ def test_killed_run_resumes_to_the_same_bytes(small_run, tmp_path, learner, agen
     assert lines[0] == "resumed at step 200"
 
 
-def test_checkpoint_of_other_settings_is_not_resumed(small_run, tmp_path):
+def test_checkpoint_of_other_settings_or_code_is_not_resumed(small_run, tmp_path, caplog):
     checkpoint = tmp_path / "checkpoint"
-    first = Training([expert(small_run)], checkpoints=[checkpoint], log=lambda line: None)
+    first = Training(
+        [dataclasses.replace(expert(small_run), made_from="code 1")], checkpoints=[checkpoint], log=lambda line: None
+    )
     first.run()
     first.close()
+    for job, code in ((expert(small_run, seed=3), "code 1"), (expert(small_run), "code 2")):
+        caplog.clear()
+        lines = []
+        train_agents([dataclasses.replace(job, made_from=code)], checkpoints=[checkpoint], log=lines.append)
+        assert "other settings, inputs or code; starting from the beginning" in caplog.text
+        assert not any("resumed" in line for line in lines)
+        first = Training(
+            [dataclasses.replace(expert(small_run), made_from="code 1")],
+            checkpoints=[checkpoint],
+            log=lambda line: None,
+        )
+        first.run()
+        first.close()
     lines = []
-    train_agents([expert(small_run, seed=3)], checkpoints=[checkpoint], log=lines.append)
-    assert "other settings" in lines[0]
-    assert not any("resumed" in line for line in lines)
+    train_agents(
+        [dataclasses.replace(expert(small_run), made_from="code 1")], checkpoints=[checkpoint], log=lines.append
+    )
+    assert any("resumed" in line for line in lines)
 
 
-def test_with_a_damaged_checkpoint_a_run_starts_from_the_beginning(small_run, tmp_path):
+def test_a_damaged_checkpoint_is_one_line_and_a_new_start(small_run, tmp_path, caplog):
     (tmp_path / "checkpoint").write_bytes(b"half")
-    lines = []
-    found = run([expert(small_run)], tmp_path / "found", checkpoints=[tmp_path / "checkpoint"], log=lines.append)
-    assert "checkpoint" in lines[0]
-    assert lines[0].endswith("starting from the beginning")
-    assert found == run([expert(small_run)], tmp_path / "without")
+    fresh = run([expert(small_run)], tmp_path / "fresh")
+    assert run([expert(small_run)], tmp_path / "run", checkpoints=[tmp_path / "checkpoint"]) == fresh
+    assert "checkpoint: damaged" in caplog.text
 
 
 def test_agents_in_lockstep_may_differ_in_reward_alone(small_run, tmp_path):
@@ -96,11 +110,12 @@ def test_rows(small_run):
         "cs_reward",
         "seed",
         "policy",
+        "kept",
         "episode",
         "metric",
         "value",
     ]
-    assert len(evaluation) == 2 * 2 * 4
+    assert (evaluation["kept"] == "kept").sum() == 2 * 2 * 7
     assert lines[-1].startswith("step 300/300")
     assert all(word in lines[-1] for word in ("steps/s", "left", "success", "|a|_1", "velocity", "temperature"))
 

@@ -10,6 +10,7 @@ import torch
 
 from mtcsirl.episodes.lockstep import Outcome
 from mtcsirl.errors import UserError
+from mtcsirl.files.checkpoint import save_checkpoint
 from mtcsirl.files.storage import checksum
 from mtcsirl.irl.methods import METHODS
 from mtcsirl.irl.methods.base import Setup
@@ -284,14 +285,12 @@ def test_same_seed_same_bytes_and_resume_ends_with_them(demonstrations, tmp_path
         assert checksum(whole / name) == checksum(stopped / name), name
 
 
-def test_a_checkpoint_of_other_settings_or_a_broken_one_is_not_taken_up(demonstrations, tmp_path, monkeypatch) -> None:
+def test_a_checkpoint_of_other_settings_or_a_broken_one_is_not_taken_up(demonstrations, tmp_path) -> None:
     whole = tmp_path / "whole"
     learn_reward(whole, "mt_csirl", "velocity", demonstrations, 100, irl_settings())
     other = _run(_trainer("mt_csirl", demonstrations), 1)
-    from mtcsirl.irl import run
-
     for name, write in {
-        "other": lambda path: run.write_tensors(path, state(other) | run._rows_to_tensors(other, "another run")),
+        "other": lambda path: save_checkpoint(path, state(other), {"curve": other.curve}, run="another run"),
         "broken": lambda path: path.write_bytes(b"half a file"),
     }.items():
         folder = tmp_path / name

@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 
+from mtcsirl.names import CS_REWARDS, METHODS, SINGLE_TASKS, TRAIN_TASKS
 from mtcsirl.results.published import load_published
 from mtcsirl.results.statistics import prediction_interval
-from mtcsirl.settings.study import CS_REWARDS, METHODS, SINGLE_TASKS, TRAIN_TASKS
 
 PAPER = load_published()
 

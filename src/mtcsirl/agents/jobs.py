@@ -10,7 +10,8 @@ from typing import Any, Literal
 
 import pandas as pd
 
-from mtcsirl.episodes.evaluation import COLUMNS, Row, metric_limit, relative_distance
+from mtcsirl.episodes.evaluation import COLUMNS, Row
+from mtcsirl.episodes.gates import metric_limit, relative_distance
 from mtcsirl.episodes.policy import Policy, save_policy
 from mtcsirl.errors import UserError
 from mtcsirl.files import storage
@@ -40,6 +41,8 @@ class AgentJob:
     keep: Literal["best", "last"] = "best"
     reward_id: str = ""
     """Tells learned rewards apart, for example a checksum: a run never resumes from a checkpoint of another reward."""
+    made_from: str = ""
+    """Hash of the run's identity: a run never resumes from a checkpoint of other code either."""
     inputs: Mapping[str, Path] = field(default_factory=dict)
     """Files that the job was made from, by name; provenance.json lists their checksums."""
 
@@ -56,7 +59,7 @@ class AgentJob:
 
     def fingerprint(self) -> str:
         """Differs between jobs whose results may differ: the checkpoint of another job is not resumed."""
-        key = (self.task, self.target, self.seed, self.cs_reward, self.gate, self.keep, self.reward_id)
+        key = (self.task, self.target, self.seed, self.cs_reward, self.gate, self.keep, self.reward_id, self.made_from)
         return hashlib.sha256(repr((key, self.settings.model_dump_json())).encode()).hexdigest()
 
 

@@ -25,20 +25,22 @@ from mtcsirl.agents.replay import Replay
 from mtcsirl.agents.scripted import ScriptedExplorers
 from mtcsirl.agents.selection import Selection, trial_episodes
 from mtcsirl.agents.streams import Purpose, Streams, uniform
-from mtcsirl.episodes.evaluation import Row, evaluate, gate_verdict, measure_episode, stochastic_means
+from mtcsirl.episodes.evaluation import Row, evaluate, measure_episode
+from mtcsirl.episodes.gates import gate_verdict, stochastic_means
 from mtcsirl.episodes.lockstep import TaskEnvironments, make_environments
 from mtcsirl.episodes.policy import Policy
+from mtcsirl.files import stop
+from mtcsirl.files.provenance import Stopwatch
+from mtcsirl.names import LAST
 from mtcsirl.rewards.mixture import PolicyReward
 from mtcsirl.worlds.environments import ACTION_SIZE
-
-EVALUATE_LAST = False
-"""Whether rows of the last policy stand beside those of the kept one; needs `evaluate`'s column `kept`."""
 
 
 def train_agents(
     jobs: Sequence[AgentJob],
     *,
     checkpoints: Sequence[Path | str] | None = None,
+    stopwatch: Stopwatch | None = None,
     log: Callable[[str], None] = print,
     events: Path | str | None = None,
     workers: int = 0,
@@ -47,8 +49,8 @@ def train_agents(
 
     checkpoints: a file of each agent to resume from and to save to, which its run alone would write and take up too;
     who saves the results removes them. Agents that have come equally far go on in lockstep, those of another step after
-    them. events: folder for TensorBoard event files. workers: processes that step the environments and evaluate, 0 for
-    none.
+    them. stopwatch: learns what earlier tries spent. events: folder for TensorBoard event files. workers: processes
+    that step the environments and evaluate, 0 for none.
 
     Raises:
         UserError: the jobs differ in more than task, target, seed, reward scale, cs_weight, curriculum, scripted or
@@ -57,14 +59,21 @@ def train_agents(
     """
     shared_settings(jobs)
     files = [None] * len(jobs) if checkpoints is None else [Path(file) for file in checkpoints]
-    steps = [resume.step_of(job, file, log) for job, file in zip(jobs, files, strict=True)]
+    saved = [resume.load(job, file) for job, file in zip(jobs, files, strict=True)]
+    steps = [0 if found is None else int(found[1]["step"]) for found in saved]
     trained: dict[int, TrainedAgent] = {}
     for step in sorted(set(steps)):
         own = [agent for agent, at in enumerate(steps) if at == step]
         training = Training(
-            [jobs[i] for i in own], checkpoints=[files[i] for i in own], log=log, events=events, workers=workers
+            [jobs[i] for i in own],
+            checkpoints=[files[i] for i in own],
+            stopwatch=stopwatch,
+            log=log,
+            events=events,
+            workers=workers,
         )
         try:
+            resume.restore(training, [saved[i] for i in own], log)
             training.run()
             trained |= zip(own, training.finish(), strict=True)
         except NotFiniteError as error:
@@ -83,6 +92,7 @@ class Training:
         jobs: Sequence[AgentJob],
         *,
         checkpoints: Sequence[Path | None] | None = None,
+        stopwatch: Stopwatch | None = None,
         log: Callable[[str], None] = print,
         events: Path | str | None = None,
         workers: int = 0,
@@ -119,19 +129,22 @@ class Training:
         until = int(settings.held_until * settings.steps)
         self._held = HeldExplorers(seeds, [one.held_share for one in own], settings.held_steps, until)
         self._progress = Progress(settings.steps, log, events)
+        self.stopwatch = stopwatch or Stopwatch()
         self._log = log
 
+    @stop.deferred()
     def run(self) -> None:
-        """Train until the budget ends, from the checkpoints if there are any."""
-        resume.restore(self, self._log)
+        """Train until the budget ends; stopped, it ends with its episode."""
         self._progress.start(self.step)
         while self.step < self.settings.steps:
             started = self.step
             self.episode()
             if self.step == self.settings.steps or self._crossed(started, self.settings.progress.select_every):
                 self._try_policies()
-            if self._crossed(started, self.settings.progress.checkpoint_every):
+            if stop.requested() or self._crossed(started, self.settings.progress.checkpoint_every):
                 resume.save(self)
+                if any(self.checkpoints):
+                    stop.stop_here(f"step {self.step}")
 
     def finish(self) -> list[TrainedAgent]:
         """Evaluate what was kept and judge it by the gates."""
@@ -142,10 +155,9 @@ class Training:
             gate_verdict(job.gate, stochastic_means(rows), job.cs_reward, job.settings.gates)
             for job, rows in zip(self.jobs, evaluations, strict=True)
         ]
-        if EVALUATE_LAST:
-            others = [own if chosen.wanted else None for chosen, own in zip(self.selections, last, strict=True)]
-            for rows, more in zip(evaluations, self._evaluate(others, "last"), strict=True):
-                rows += more
+        others = [own if chosen.wanted else None for chosen, own in zip(self.selections, last, strict=True)]
+        for rows, more in zip(evaluations, self._evaluate(others, LAST), strict=True):
+            rows += more
         batch = tuple(job.label for job in self.jobs)
         frames = [pd.DataFrame(curve, columns=["step", "metric", "value"]) for curve in self.curves]
         return [

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from mtcsirl.names import EVALUATION_TARGET
 from mtcsirl.results.published import Published
 from mtcsirl.results.rows import KEY, MISSING, OK, select
 from mtcsirl.results.statistics import Array, Summary, probability_of_improvement, summarise
 from mtcsirl.settings import Settings
-from mtcsirl.study.runs import EVALUATION_TARGET
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ from pydantic import Field
 
 from mtcsirl.settings.base import Frozen
 from mtcsirl.settings.budgets import granted
+from mtcsirl.settings.configuration import Settings
 from mtcsirl.settings.irl import IrlAlgorithmSettings, IrlSettings, ScoreSettings
 from mtcsirl.settings.learner import (
     EnvironmentSettings,
@@ -18,7 +19,7 @@ from mtcsirl.settings.learner import (
     ProgressSettings,
     SacSettings,
 )
-from mtcsirl.settings.study import Settings
+from mtcsirl.settings.unread import sliced, unread
 
 
 class AgentRunSettings(Frozen):
@@ -100,7 +101,7 @@ def _scripted(settings: Settings, task: str) -> dict[str, Any]:
 def expert_run(settings: Settings, task: str, cs_reward: str) -> AgentRunSettings:
     """The settings of an expert for ``task`` and ``cs_reward``."""
     expert = settings.expert
-    return _agent(
+    run = _agent(
         settings,
         expert.sac(settings.sac),
         task,
@@ -116,17 +117,19 @@ def expert_run(settings: Settings, task: str, cs_reward: str) -> AgentRunSetting
         held_steps=expert.held_steps,
         held_until=expert.held_until,
     )
+    return sliced(run, unread("train_expert", cs_reward=cs_reward))
 
 
 def baseline_run(settings: Settings, task: str) -> AgentRunSettings:
     """The settings of plain SAC on ``task``."""
-    return _agent(settings, settings.baseline.sac(settings.sac), task, settings.baseline.steps)
+    run = _agent(settings, settings.baseline.sac(settings.sac), task, settings.baseline.steps)
+    return sliced(run, unread("train_sac"))
 
 
 def transfer_run(settings: Settings, task: str) -> AgentRunSettings:
     """The settings of a transfer agent on ``task``."""
     transfer = settings.transfer
-    return _agent(
+    run = _agent(
         settings,
         transfer.sac(settings.sac),
         task,
@@ -134,26 +137,27 @@ def transfer_run(settings: Settings, task: str) -> AgentRunSettings:
         cs_weight=transfer.cs_weight,
         curriculum=transfer.curriculum,
     )
+    return sliced(run, unread("transfer"))
 
 
-def demonstration_run(settings: Settings, experiments: tuple[str, ...] = ("multi_target",)) -> DemonstrationRunSettings:
-    """The settings of one expert's demonstrations: as many episodes as the hungriest of ``experiments`` reads."""
-    episodes = max(settings.demonstrations.episodes[name] for name in experiments)  # type: ignore[index]
-    return DemonstrationRunSettings(
+def demonstration_run(settings: Settings, cs_reward: str) -> DemonstrationRunSettings:
+    """The settings of the demonstrations of an expert for ``cs_reward``: as many as the hungriest experiment reads."""
+    run = DemonstrationRunSettings(
         environment=settings.environment,
-        episodes=episodes,
+        episodes=max(settings.demonstrations.episodes.values()),
         episode_steps=settings.evaluation.episode_steps,
         gates=settings.gates,
     )
+    return sliced(run, unread("collect_demonstrations", cs_reward=cs_reward))
 
 
-def irl_run(settings: Settings, experiment: str, tasks: Collection[str]) -> IrlRunSettings:
-    """The settings of one IRL run of ``experiment`` on ``tasks``."""
+def irl_run(settings: Settings, experiment: str, tasks: Collection[str], method: str = "") -> IrlRunSettings:
+    """The settings of one IRL run of ``experiment`` on ``tasks`` with ``method`` (none: one that reads all keys)."""
     scripted = {task: steps for task, steps in settings.exploration.scripted_steps.items() if task in tasks and steps}
-    return IrlRunSettings(
+    run = IrlRunSettings(
         environment=settings.environment,
         sac=settings.irl.scaling().sac(settings.sac),
-        irl=_irl(settings, tasks),
+        irl=_irl(settings, experiment, tasks),
         scripted_steps=scripted,
         scripted_noise=settings.exploration.scripted_noise if scripted else 0.0,
         demonstration_episodes=settings.demonstrations.episodes[experiment],  # type: ignore[index]
@@ -161,13 +165,27 @@ def irl_run(settings: Settings, experiment: str, tasks: Collection[str]) -> IrlR
         gates=settings.gates,
         progress=settings.progress,
     )
+    return sliced(run, unread("learn_reward", method=method))
 
 
-def _irl(settings: Settings, tasks: Collection[str]) -> IrlSettings:
-    """The algorithm with the warm-up of the slowest of ``tasks``: generators go through it together."""
-    study = settings.irl
+def _irl(settings: Settings, experiment: str, tasks: Collection[str]) -> IrlSettings:
+    """The algorithm as ``experiment`` has it, with the warm-up of the slowest of ``tasks``: all go through it together.
+
+    Updates become gradient steps. An epoch is ``steps_per_iteration`` environment steps with one gradient step each;
+    with G_updates counted in epochs an iteration collects that many of them, and so does each discriminator's turn see
+    that many trajectories.
+    """
+    study, epoch = settings.irl, settings.irl.steps_per_iteration
     shared = {name: getattr(study, name) for name in IrlAlgorithmSettings.model_fields}
-    return IrlSettings(**shared, warm_up_iterations=max(granted(study.warm_up_iterations, task) for task in tasks))
+    discriminator, generator = study.discriminator_updates[experiment], study.generator_updates[experiment]
+    in_epochs = study.generator_update == "epoch"
+    own = {
+        "steps_per_iteration": epoch * generator if in_epochs else epoch,
+        "discriminator_updates": discriminator * (epoch if study.discriminator_update == "epoch" else 1),
+        "generator_updates": generator * (epoch if in_epochs else 1),
+        "warm_up_iterations": max(granted(study.warm_up_iterations, task) for task in tasks),
+    }
+    return IrlSettings(**{**shared, **own})
 
 
 def score_run(settings: Settings) -> ScoreRunSettings:
