@@ -15,7 +15,7 @@ def draw(data: FigureData) -> Figure:
     return scatter_figure(
         data.settings.scale,
         single_target.correlation(data, data.settings.single_target.tasks[0], _CS_REWARD),
-        single_target.METHOD,
+        data.settings.single_target.method,
         _CS_REWARD,
     )
 

@@ -10,6 +10,7 @@ from mtcsirl.figures.style import (
     LOOKS,
     TEXT_WIDTH,
     add_notes,
+    look,
     new_figure,
     panel_title,
     quantity,
@@ -21,7 +22,7 @@ from mtcsirl.names import EVALUATION_TARGET
 from mtcsirl.settings.runs import irl_run
 from mtcsirl.study.design import design
 
-EXPERIMENT, METHOD = "single_target", "mt_csirl"
+EXPERIMENT = "single_target"
 SCATTER_CS_REWARD = "velocity"
 
 
@@ -29,7 +30,7 @@ def curve_series(data: FigureData, artefact: str, task: str, metric: str) -> lis
     """IRL agent, Transferred and SAC on ``task``, with the runs that ``artefact`` asks for."""
     study = design(data.settings, artefact)
     here = {"task": task, "target": EVALUATION_TARGET, "metric": metric}
-    reward = {"experiment": EXPERIMENT, "method": METHOD, "cs_reward": metric, "source": task}
+    reward = {"experiment": EXPERIMENT, "cs_reward": metric, "source": task}
     transfers = [run for run in study.transfers if run.irl.cs_reward == metric and run.irl.experiment == EXPERIMENT]
     runs = [run for run in study.irl_runs if run.cs_reward == metric and run.source == task]
     baselines = [run for run in study.baselines if run.task == task]
@@ -42,7 +43,7 @@ def curve_series(data: FigureData, artefact: str, task: str, metric: str) -> lis
         ),
         Series(
             "Transferred",
-            LOOKS[METHOD],
+            look(data.settings.single_target.method),
             rows_where(data.curves, here | reward | {"stage": "transfer"}),
             tuple((run.task, run.seed) for run in transfers),
         ),
@@ -57,7 +58,13 @@ def curve_series(data: FigureData, artefact: str, task: str, metric: str) -> lis
 
 def correlation(data: FigureData, task: str, cs_reward: str) -> Correlation:
     """The single-target reward of ``task`` against the truth."""
-    return select_correlation(data, experiment=EXPERIMENT, method=METHOD, cs_reward=cs_reward, source=task)
+    return select_correlation(
+        data,
+        experiment=EXPERIMENT,
+        method=data.settings.single_target.method,
+        cs_reward=cs_reward,
+        source=task,
+    )
 
 
 @styled
@@ -75,7 +82,8 @@ def draw(data: FigureData, artefact: str, task: str, metrics: list[str], *, scat
         notes += [f"({chr(ord('a') + index)}) {note}" for note in missing_note(series)]
     if scatter:
         panel_title(axes[-1], panels - 1, "Rewards' correlation")
-        draw_scatter(axes[-1], correlation(data, task, SCATTER_CS_REWARD), METHOD, SCATTER_CS_REWARD)
+        method = data.settings.single_target.method
+        draw_scatter(axes[-1], correlation(data, task, SCATTER_CS_REWARD), method, SCATTER_CS_REWARD)
     add_legend(figure, axes[: len(metrics)])
     add_notes(figure, notes + scale_notes(data.settings.scale))
     return figure

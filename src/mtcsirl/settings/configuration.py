@@ -100,12 +100,14 @@ class SingleTargetSettings(Frozen):
     """Section 5.1: one task, one target; the reward is tried on the same task and target."""
 
     tasks: Tasks = key(SINGLE_TASKS, "tasks, each on its own", paper=SINGLE_TASKS)
+    method: Method = key("mt_csirl", "IRL method", paper="mt_csirl")
 
 
 class MultiTargetSettings(Frozen):
     """Section 5.2: one task, several targets; the reward is tried on a new target of every task."""
 
     tasks: Tasks = key(SINGLE_TASKS, "rows and columns of Tables 1 and 3", paper=SINGLE_TASKS)
+    method: Method = key("mt_csirl", "IRL method", paper="mt_csirl")
     train_targets: Targets = key((1, 2, 3), "targets with experts; T = their number", paper=(1, 2, 3, 4, 5))
 
     @model_validator(mode="after")

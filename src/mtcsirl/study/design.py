@@ -32,17 +32,17 @@ def _demonstrations(cs_reward: str, members: Iterable[tuple[str, int]], seed: in
     return tuple(Demonstrations(Expert(cs_reward, task, target, seed)) for task, target in members)
 
 
-def _single_irl(task: str, cs_reward: str, seed: int) -> IrlRun:
+def _single_irl(settings: Settings, task: str, cs_reward: str, seed: int) -> IrlRun:
     """A seed is a replicate: its IRL run imitates the expert of the same seed."""
     shown = _demonstrations(cs_reward, [(task, EVALUATION_TARGET)], seed)
-    return IrlRun("single_target", "mt_csirl", cs_reward, task, seed, shown)
+    return IrlRun("single_target", settings.single_target.method, cs_reward, task, seed, shown)
 
 
 def _multi_target_irl(settings: Settings, task: str, cs_reward: str, seed: int) -> IrlRun:
     """One expert per target, that of the first seed: results are conditional on the experts."""
     members = [(task, target) for target in settings.multi_target.train_targets]
     shown = _demonstrations(cs_reward, members, settings.seeds[0])
-    return IrlRun("multi_target", "mt_csirl", cs_reward, task, seed, shown)
+    return IrlRun("multi_target", settings.multi_target.method, cs_reward, task, seed, shown)
 
 
 def _multi_task_irl(settings: Settings, method: str, cs_reward: str, seed: int) -> IrlRun:
@@ -73,14 +73,14 @@ def _single_target_curves(settings: Settings, task: str) -> Iterator[AnyRun]:
     yield from _baselines(settings, [task])
     for cs in settings.cs_rewards:
         for seed in settings.seeds:
-            yield Transfer(_single_irl(task, cs, _irl_seed(settings, seed)), task, EVALUATION_TARGET, seed)
+            yield Transfer(_single_irl(settings, task, cs, _irl_seed(settings, seed)), task, EVALUATION_TARGET, seed)
 
 
 def _single_target_scores(settings: Settings, cs_reward: str, tasks: Iterable[str]) -> Iterator[AnyRun]:
     """Figures 2c and 6, claim C4: the reward of one task against the truth on that task."""
     for task in tasks if cs_reward in settings.cs_rewards else ():
         for seed in settings.irl_seeds:
-            yield _score(settings, _single_irl(task, cs_reward, seed), task)
+            yield _score(settings, _single_irl(settings, task, cs_reward, seed), task)
 
 
 def _multi_task_scores(settings: Settings, cs_reward: str, tasks: Iterable[str]) -> Iterator[AnyRun]:
@@ -193,7 +193,7 @@ def _runs(settings: Settings, ablation: str, name: str) -> Iterator[AnyRun]:
 
     for task in chosen.tasks:
         for seed in chosen.seeds:
-            irl = replace(_single_irl(task, chosen.cs_reward, seed), variant=of("irl"))
+            irl = replace(_single_irl(settings, task, chosen.cs_reward, seed), variant=of("irl"))
             runs: dict[str, AnyRun] = {
                 "expert": Expert(chosen.cs_reward, task, EVALUATION_TARGET, seed, of("expert")),
                 "irl": irl,

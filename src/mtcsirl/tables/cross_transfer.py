@@ -17,7 +17,7 @@ REMARK = "The paper prints no spread for this table, so there is no prediction i
 
 def transfer_cell(rows: pd.DataFrame, published: Published, cs_reward: str, source: str, task: str) -> Cell:
     """metric / target of new agents on ``task`` with the reward of ``source``."""
-    key = {"stage": "transfer", "experiment": "multi_target", "method": "mt_csirl", "cs_reward": cs_reward}
+    key = {"stage": "transfer", "experiment": "multi_target", "cs_reward": cs_reward}
     chosen = select(rows, **key, source=source, task=task, target=EVALUATION_TARGET)
     paper = published.cross_transfer(cs_reward, source, task)
     return make_cell(chosen, cs_reward, paper, published.target(cs_reward))
