@@ -168,7 +168,7 @@ def _ablation(parsed: argparse.Namespace) -> None:
 
 def _claims(parsed: argparse.Namespace) -> None:
     from mtcsirl.claims.claims import claims_json, claims_markdown
-    from mtcsirl.figures.claims import CAPTION, claims_figure
+    from mtcsirl.figures.claims import caption, claims_figure
     from mtcsirl.files.storage import write_json, write_text
 
     settings = study_settings(parsed)
@@ -177,7 +177,7 @@ def _claims(parsed: argparse.Namespace) -> None:
     text = claims_markdown(findings, settings)
     write_json(folder / "claims.json", claims_json(findings, settings))
     write_text(folder / "claims.md", text)
-    write_figure(folder / "claims", claims_figure(findings, settings), CAPTION)
+    write_figure(folder / "claims", claims_figure(findings, settings), caption())
     print(text)
 
 
@@ -185,14 +185,15 @@ def _judged(settings: Settings, partial: bool) -> "list[Finding]":
     import pandas as pd
 
     from mtcsirl.claims.claims import judge
-    from mtcsirl.results.rows import ablated_generators, evaluation_rows, score_rows
+    from mtcsirl.results.rows import ablated_generators, evaluation_rows, point_rows, score_rows
     from mtcsirl.study.design import variants
 
     study, name = design(settings), "ablation_curriculum"
     rows = evaluation_rows(study, settings.results, partial=partial)
     without = ablated_generators(variants(settings, name)["constant"], settings.results, name)
     scores = score_rows(study, settings.results, partial=partial)
-    return judge(pd.concat([rows, without], ignore_index=True), scores, settings)
+    points = point_rows(study, settings.results, partial=partial)
+    return judge(pd.concat([rows, without], ignore_index=True), scores, settings, points=points)
 
 
 def _results(parsed: argparse.Namespace) -> None:

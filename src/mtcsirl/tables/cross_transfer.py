@@ -4,6 +4,7 @@ import pandas as pd
 
 from mtcsirl.results.published import Published
 from mtcsirl.results.rows import select
+from mtcsirl.rewards.ground_truth import COMMON_SENSE_REWARDS
 from mtcsirl.settings import Settings
 from mtcsirl.study.runs import EVALUATION_TARGET
 from mtcsirl.tables.cells import Cell, make_cell
@@ -17,13 +18,14 @@ def transfer_cell(rows: pd.DataFrame, published: Published, cs_reward: str, sour
     key = {"stage": "transfer", "experiment": "multi_target", "method": "mt_csirl", "cs_reward": cs_reward}
     chosen = select(rows, **key, source=source, task=task, target=EVALUATION_TARGET)
     paper = published.cross_transfer(cs_reward, source, task)
-    return make_cell(chosen, cs_reward, paper, published.target(cs_reward))
+    return make_cell(chosen, cs_reward, paper, COMMON_SENSE_REWARDS[cs_reward].target)
 
 
 def baseline_cell(rows: pd.DataFrame, published: Published, cs_reward: str, task: str) -> Cell:
     """metric / target of plain SAC on ``task``."""
     chosen = select(rows, stage="train_sac", task=task, target=EVALUATION_TARGET)
-    return make_cell(chosen, cs_reward, published.cross_baseline(cs_reward, task), published.target(cs_reward))
+    paper = published.cross_baseline(cs_reward, task)
+    return make_cell(chosen, cs_reward, paper, COMMON_SENSE_REWARDS[cs_reward].target)
 
 
 def cross_transfer_table(
@@ -40,7 +42,7 @@ def cross_transfer_table(
     quantity = cs_reward.replace("_", " ")
     caption = (
         f"{quantity.capitalize()} cs-reward, several targets: {quantity} of a new agent divided by its target "
-        f"({published.target(cs_reward):g}); closer to 1 is better. Rows: the task on whose targets "
+        f"({COMMON_SENSE_REWARDS[cs_reward].target:g}); closer to 1 is better. Rows: the task on whose targets "
         f"{', '.join(map(str, settings.multi_target.train_targets))} MT-CSIRL learned the reward; columns: the task on "
         f"whose target {EVALUATION_TARGET}, not among them, a new agent was trained and evaluated."
     )

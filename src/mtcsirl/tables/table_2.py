@@ -5,6 +5,7 @@ import pandas as pd
 from mtcsirl.figures.style import look
 from mtcsirl.results.published import Published, in_paper_order, load_published
 from mtcsirl.results.rows import select
+from mtcsirl.rewards.ground_truth import COMMON_SENSE_REWARDS
 from mtcsirl.settings import Settings
 from mtcsirl.study.runs import EVALUATION_TARGET
 from mtcsirl.tables.cells import Cell, make_cell
@@ -65,6 +66,6 @@ def table_2(rows: pd.DataFrame, settings: Settings, published: Published | None 
     caption = CAPTION.format(
         tasks=", ".join(settings.multi_task.unseen_tasks),
         target=EVALUATION_TARGET,
-        targets=", ".join(f"{published.target(cs):g}" for cs in in_paper_order(settings.cs_rewards)),
+        targets=", ".join(f"{COMMON_SENSE_REWARDS[cs].target:g}" for cs in in_paper_order(settings.cs_rewards)),
     )
     return result_table("table_2", caption, "Agent", columns, body, settings, REMARKS)

@@ -4,6 +4,7 @@ import pandas as pd
 
 from mtcsirl.results.published import Published, in_paper_order, load_published
 from mtcsirl.results.rows import select
+from mtcsirl.rewards.ground_truth import COMMON_SENSE_REWARDS
 from mtcsirl.settings import Settings
 from mtcsirl.tables.cells import Cell, make_cell
 from mtcsirl.tables.table import Column, Entry, Table, result_table
@@ -22,7 +23,7 @@ def learned_task_cell(
     """``metric`` (the cs-reward's as a ratio to its target, or success) of new agents on ``task``."""
     key = {"stage": "transfer", "experiment": "multi_task", "method": "mt_csirl_lt", "cs_reward": cs_reward}
     chosen = select(rows, **key, task=task, target=settings.multi_task.train_targets[0])
-    scale = published.target(cs_reward) if metric == cs_reward else 1.0
+    scale = COMMON_SENSE_REWARDS[cs_reward].target if metric == cs_reward else 1.0
     return make_cell(chosen, metric, published.learned_task(task, cs_reward, metric), scale)
 
 
