@@ -8,7 +8,7 @@ SMOKE := --configfile config/smoke.yaml
 # the tools find each other, and every job finds `mtcsirl`, without an activated environment
 export PATH := $(CURDIR)/$(BIN):$(PATH)
 
-.PHONY: help setup replicate smoke test lint bench constraints
+.PHONY: help setup replicate smoke quick test lint bench audit constraints
 
 help:  ## print this list
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
@@ -27,8 +27,14 @@ replicate: setup  ## the whole paper at desk scale: every table, figure, verdict
 smoke: setup  ## the same in minutes, too small to mean anything
 	snakemake --cores $(CORES) $(SMOKE)
 
-test: setup  ## all tests
-	pytest
+quick: setup  ## what one runs before each commit, under two minutes on two idle cores: lint, fast tests
+	ruff check
+	ruff format --check
+	pytest -n $(CORES) --dist loadfile -m "not slow and not dag" --ignore tests/dag
+
+test: setup  ## all tests, with coverage; the smoke DAG comes last, as it uses the cores itself
+	pytest -n $(CORES) --dist loadfile -m "not dag" --cov
+	pytest -m dag
 
 lint: setup  ## formatting, lint and types, all of which must be clean
 	ruff check
@@ -39,6 +45,11 @@ lint: setup  ## formatting, lint and types, all of which must be clean
 bench: setup  ## measured ratios against stable-baselines3, stock Meta-World and imitation
 	sh benchmarks/imitation_environment.sh
 	python -m benchmarks
+
+audit:  ## look constraints.txt up in a database of known vulnerabilities; needs the network
+	$(PYTHON) -m venv build/audit
+	build/audit/bin/python -m pip install --quiet pip-audit
+	$(PYTHON) .ci/audit.py build/audit/bin/pip-audit constraints.txt
 
 constraints:  ## renew constraints.txt: the newest versions that pyproject.toml allows
 	rm -rf build/constraints

@@ -31,7 +31,5 @@ include: "workflow/rules/ablations.smk"
 rule all:
     default_target: True
     input:
-        rules.report.input.tables,
-        rules.report.input.figures,
-        rules.claims.output,
+        rules.report.input,
         rules.report.output,

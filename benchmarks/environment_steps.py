@@ -22,7 +22,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 import numpy as np
 
 from benchmarks.sides import Row, print_rows, row, seconds
-from mtcsirl.settings.study import DESIGN_TASKS
+from mtcsirl.names import DESIGN_TASKS
 from mtcsirl.worlds.environments import EPISODE_STEPS, make_environment
 from mtcsirl.worlds.fast.identity import first_difference, stock_environment
 

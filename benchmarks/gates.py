@@ -21,8 +21,8 @@ import torch
 
 from mtcsirl.errors import UserError
 from mtcsirl.files.storage import read_json, write_csv
+from mtcsirl.names import DESIGN_TASKS
 from mtcsirl.settings.loading import load
-from mtcsirl.settings.study import DESIGN_TASKS
 from mtcsirl.stages.together import train_together
 from mtcsirl.study.runs import Baseline, Expert
 

@@ -84,7 +84,7 @@ def _irl_on_meta_world() -> Callable[[], None]:
     policy = FusedSac(1, settings.sac, seeds=[0]).policy(0)
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "demonstrations.parquet"
-        write_parquet(file, collect_demonstrations(policy, TASK, 0, run, seed=0))
+        write_parquet(file, collect_demonstrations(policy, TASK, 0, run, seed=0, cs_reward="velocity"))
         return make_trainer("mt_csirl", "velocity", [file], 0, settings).iterate
 
 
@@ -137,7 +137,7 @@ class _Imitation:
             "steps_per_iteration": irl.steps_per_iteration,
             "generator_updates": irl.generator_updates,
             "sac_minibatch": sac.minibatch,
-            "temperature": irl.temperature,
+            "temperature": Settings().irl.temperature,
             "sac_hidden_sizes": sac.hidden_sizes,
             "hidden_sizes": irl.discriminator.hidden_sizes,
             "minibatch": irl.discriminator.minibatch,

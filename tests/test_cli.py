@@ -15,14 +15,15 @@ import pytest
 from mtcsirl import cli
 from mtcsirl.commands.arguments import run_settings
 from mtcsirl.files import storage
+from mtcsirl.files.identity import FILE, Record, checksums, dumps, result_files
 from mtcsirl.settings import Settings
 from mtcsirl.settings.loading import load
 from mtcsirl.settings.runs import AgentRunSettings, expert_run
 from mtcsirl.study.design import design
 from mtcsirl.study.outputs import OUTPUTS
 from mtcsirl.study.plan import Rates, cost, load_rates, plan, wall_hours
-from mtcsirl.study.runs import Expert
-from mtcsirl.study.status import DONE, FAILED, OUTDATED, RUNNING, WAITING, run_status, seconds_left, study_status
+from mtcsirl.study.runs import Expert, identity_of
+from mtcsirl.study.status import DONE, FAILED, RUNNING, STALE, WAITING, run_status, seconds_left, study_status
 
 KEY = ["--task", "reach", "--seed", "0"]
 
@@ -87,7 +88,7 @@ def test_the_library_knows_neither_snakemake_nor_argparse(checkout: Path) -> Non
         (["figure", "99"], "invalid choice: '99'"),
         (["plan", "--target", "figure_99"], "unknown artefact 'figure_99'; allowed: table_1, "),
         (["learn-reward", "--method", "gail"], "unknown method 'gail'; allowed: mt_airl, "),
-        (["table", "2"], "evaluation.csv: this run is missing"),
+        (["table", "2"], "this run is missing"),
     ],
     ids=lambda value: " ".join(value[:4]) if isinstance(value, list) else "",
 )
@@ -211,9 +212,10 @@ def small(tmp_path: Path) -> Settings:
 
 def test_status_follows_a_run(small: Settings, tmp_path: Path) -> None:
     run = Expert("velocity", "reach", 1, 0)
-    folder, log = tmp_path / run.folder, tmp_path / "logs" / f"{run.folder}.log"
+    folder = tmp_path / run.folder
+    log = tmp_path / "logs" / run.folder / f"{identity_of(run, small).hash}.log"
     assert run_status(run, small).state == WAITING
-    storage.append_line(log, "step 300/600")
+    storage.write_text(log, "step 300/600\n")
     assert run_status(run, small).state == RUNNING, "it has just started"
     with storage.locked(folder):
         os.utime(log, (0, 0))
@@ -224,12 +226,16 @@ def test_status_follows_a_run(small: Settings, tmp_path: Path) -> None:
     storage.write_json(folder / "settings.json", run.settings(small).model_dump(mode="json"))
     storage.write_json(folder / "provenance.json", {"cost": {"wall_seconds": 12.0}})
     storage.write_json(folder / "gate.json", {"passed": False})
+    record = Record(identity_of(run, small), checksums(folder, result_files(folder)))
+    storage.write_text(folder / FILE, dumps(record))
     done = run_status(run, small)
     assert (done.state, done.passed, done.seconds) == (DONE, False, 12.0)
     changed = small.model_copy(update={"expert": small.expert.model_copy(update={"steps": {"default": 601}})})
-    assert run_status(run, changed).state == OUTDATED
+    assert run_status(run, changed).state == STALE
+    assert run_status(run, changed).says == "held_until: 300 -> 450; steps: 400 -> 601"
     storage.write_text(folder / "gate.json", "{")
     assert run_status(run, small).state == FAILED, "a truncated file"
+    assert "changed since its run wrote it" in run_status(run, small).says
 
 
 def test_time_left_is_what_the_done_runs_took(small: Settings, rates: Rates) -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 
 from mtcsirl.claims.claims import judge, load_criteria
-from mtcsirl.results.rows import KEY, select
+from mtcsirl.results.rows import select
 from mtcsirl.settings import Settings
 from mtcsirl.study.design import design
 from tests.results.made_up import evaluation, noise
@@ -17,6 +17,8 @@ SAC = {"velocity": 0.32, "action_norm": 1.57}
 CORRELATIONS = {"single_target": 0.1, "multi_task": 0.87}
 """Partial r of learned and true reward given r_task."""
 SPREAD = 0.03
+WITHOUT = "ablation_curriculum/constant"
+"""The experiment of generators without the curriculum."""
 CLAIMS = tuple(load_criteria()["claims"])
 
 
@@ -43,7 +45,7 @@ def as_the_paper_says(agent):
     if agent["stage"] in ("train_expert", "collect_demonstrations"):
         return at(cs, 0.99)
     if agent["stage"] == "learn_reward":
-        return at(cs, 0.9, 0.5 if experiment == "ablation_curriculum" else 1.0)
+        return at(cs, 0.9, 0.5 if experiment == WITHOUT else 1.0)
     if experiment == "single_target":
         return at(cs, 0.03)
     if experiment == "multi_target":
@@ -56,20 +58,6 @@ def as_the_paper_says(agent):
 def changed(test, result):
     """As the paper says, except where ``test(agent)`` holds: there ``result(agent)``."""
     return lambda agent: result(agent) if test(agent) else as_the_paper_says(agent)
-
-
-def with_ablation(rows, means, spread=SPREAD):
-    """Rows with the generators of the ablation without the curriculum beside them."""
-    ablations = SETTINGS.ablations
-    own = select(rows, experiment="single_target", stage="learn_reward", source=ablations.tasks)
-    own = select(own, cs_reward=ablations.cs_reward, seed=list(ablations.seeds)).assign(
-        experiment="ablation_curriculum"
-    )
-    keys = own[list(KEY)].to_dict("records")
-    jitter = [noise(key, "success", "") for key in keys]
-    success = [means(key)["success"] * (1 + spread * x) for key, x in zip(keys, jitter, strict=True)]
-    own = own.assign(value=own["value"].where(own["metric"] != "success", success))
-    return pd.concat([rows, own], ignore_index=True)
 
 
 def scored(settings=SETTINGS):
@@ -124,7 +112,7 @@ def usual_points(settings):
 
 
 def rows_of(means, spread=SPREAD, settings=SETTINGS):
-    rows = with_ablation(evaluation(study(settings), means, spread), means, spread)
+    rows = evaluation(study(settings), means, spread)
     return rows[(rows["policy"] == "stochastic") & (rows["metric"] != "task_reward")].reset_index(drop=True)
 
 

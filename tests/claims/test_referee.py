@@ -9,6 +9,7 @@ from mtcsirl.results.statistics import Summary
 from mtcsirl.settings import Settings
 from tests.claims.made_up import (
     SETTINGS,
+    WITHOUT,
     at,
     changed,
     fail_gates,
@@ -157,7 +158,7 @@ def test_the_ablation_has_the_seeds_that_a_verdict_needs():
     assert len(Settings().ablations.seeds) >= load_criteria()["seeds"]
     assert verdict("C12") == "reproduced"
     two = SETTINGS.ablations.model_copy(update={"seeds": (0, 1)})
-    few = finding("C12", change=lambda rows: rows[(rows["experiment"] != "ablation_curriculum") | (rows["seed"] < 2)])
+    few = finding("C12", change=lambda rows: rows[(rows["experiment"] != WITHOUT) | (rows["seed"] < 2)])
     assert len(two.seeds) < load_criteria()["seeds"]
     assert few.verdict == "inconclusive"
 

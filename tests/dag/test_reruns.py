@@ -1,18 +1,41 @@
-"""What runs again after a change, and what does not. Dry runs on the finished smoke DAG."""
+"""What runs again after a change, and what does not. Dry runs on the finished smoke study."""
 
 import os
-from collections.abc import Callable
+import re
+import shutil
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
 
+from mtcsirl import cli
+from mtcsirl.files.identity import FILE
 from mtcsirl.settings import Settings
 from mtcsirl.study.design import ARTEFACTS, design
 from mtcsirl.study.runs import IrlRun, Transfer
 from tests.dag.conftest import SMOKE, TARGETS, Snakemake, job_counts
 
 pytestmark = pytest.mark.dag
-Edit = Callable[[str], None]
+Change = Callable[[str, str, str], None]
+RUNS = {"train_expert", "train_sac", "collect_demonstrations", "learn_reward", "transfer", "score_reward"}
+DRAWN_FROM_NO_RUN = {"figure_1", "figure_8", "figure_9"}
+
+
+@pytest.fixture
+def change(workspace: Path) -> Iterator[Change]:
+    """Replace text in a file of the workspace's package (a regular expression), and take it back after the test."""
+    kept: dict[Path, bytes] = {}
+
+    def replace(module: str, old: str, new: str) -> None:
+        path = workspace / "src/mtcsirl" / module
+        text = path.read_text()
+        assert re.search(old, text), f"{module} has no {old}"
+        kept.setdefault(path, path.read_bytes())
+        path.write_text(re.sub(old, new, text, count=1))
+
+    yield replace
+    for path, content in kept.items():
+        path.write_bytes(content)
 
 
 def plan(snakemake: Snakemake, *arguments: str) -> dict[str, int]:
@@ -21,77 +44,137 @@ def plan(snakemake: Snakemake, *arguments: str) -> dict[str, int]:
     return {name: count for name, count in planned.items() if name not in ("report", "all")}
 
 
+def stages(planned: dict[str, int]) -> set[str]:
+    """The stages among the jobs."""
+    return RUNS & set(planned)
+
+
 def test_a_second_run_has_nothing_to_do(smoke: Path, snakemake: Snakemake) -> None:
     done = snakemake("--cores", "2", *TARGETS, *SMOKE)
     assert done.returncode == 0
     assert "Nothing to be done" in done.stdout + done.stderr
 
 
-def test_a_touched_source_reruns_nothing(smoke: Path, snakemake: Snakemake) -> None:
-    os.utime(smoke / "src/mtcsirl/irl/methods/mt_csirl.py")
+NEUTRAL = {
+    "a comment": ("agents/sac.py", r"\Z", "\n# said anew\n"),
+    "a docstring": ("irl/losses.py", r'"""Logits and losses', '"""Losses and logits'),
+    "a type": (
+        "agents/replay.py",
+        r"minibatch: int, recent: int \| None",
+        "minibatch: int, recent: 'int | None'",
+    ),
+    "a reformatted line": ("rewards/curriculum.py", r"R_MAX = 10\.0", "R_MAX = (\n    10.0\n)"),
+    "an error's words": ("agents/replay.py", "nothing to sample", "there is nothing to sample"),
+    "an optional learner": ("agents/reference.py", r"self\.updates \+= 1", "self.updates += 1 + 0"),
+    "the plan": ("study/plan.py", r"SCORE_SETS = \d+", "SCORE_SETS = 17"),
+    "how a job is locked and signed": ("stages/running.py", r"agents: int = 1", "agents: int = 2"),
+    "a line for people": ("agents/progress.py", r"_SECONDS_BETWEEN_LINES = 5\.0", "_SECONDS_BETWEEN_LINES = 6.0"),
+}
+
+
+@pytest.mark.parametrize("what", NEUTRAL)
+def test_what_changes_no_number_reruns_nothing(smoke: Path, snakemake: Snakemake, change: Change, what: str) -> None:
+    change(*NEUTRAL[what])
     assert plan(snakemake) == {}
 
 
-@pytest.mark.parametrize("method", ["mt_vairl", "mt_csirl"])
-def test_an_edited_method_reruns_that_method(
-    smoke: Path, snakemake: Snakemake, edit: Edit, smoke_settings: Settings, method: str
+def test_a_function_moved_and_a_file_renamed_rerun_nothing(
+    smoke: Path, snakemake: Snakemake, change: Change, workspace: Path
 ) -> None:
-    edit(f"irl/methods/{method}.py")
+    source = workspace / "src/mtcsirl/rewards/curriculum.py"
+    renamed = source.with_name("lesson.py")
+    users = [path for path in (workspace / "src").rglob("*.py") if "rewards.curriculum" in path.read_text()]
+    for path in users:
+        change(str(path.relative_to(workspace / "src/mtcsirl")), r"rewards\.curriculum", "rewards.lesson")
+    source.rename(renamed)
+    try:
+        assert plan(snakemake) == {}
+    finally:
+        renamed.rename(source)
+
+
+def test_a_new_key_with_the_value_of_old_reruns_nothing(smoke: Path, snakemake: Snakemake, change: Change) -> None:
+    key = '    novelty: float = key(0.0, "something new", absent=0.0)\n    device: str'
+    change("settings/learner.py", r"    device: str", key)
+    assert plan(snakemake) == {}
+    again = plan(snakemake, "--config", "sac={novelty: 1.0}")
+    assert stages(again) >= {"train_expert", "train_sac", "learn_reward", "transfer"}
+
+
+CONCERNED = {
+    "the policy that new agents keep": (("stages/transfer.py", r'keep="last"', 'keep="best"'), {"transfer"}),
+    "a constant of a score": (
+        ("results/scoring.py", r"EPIC_TRANSITIONS = 256", "EPIC_TRANSITIONS = 255"),
+        {"score_reward"},
+    ),
+    "how demonstrations are made": (
+        ("stages/collect_demonstrations.py", r"seed=shown\.seed", "seed=shown.seed + 1"),
+        {"collect_demonstrations", "learn_reward", "transfer", "score_reward"},
+    ),
+    "the learner": (("agents/gaussian.py", r"SQUASH_EPSILON = 1e-6", "SQUASH_EPSILON = 1e-7"), RUNS),
+}
+
+
+@pytest.mark.parametrize("what", CONCERNED)
+def test_an_edit_reruns_what_it_concerns(smoke: Path, snakemake: Snakemake, change: Change, what: str) -> None:
+    edit, concerned = CONCERNED[what]
+    change(*edit)
     planned = plan(snakemake)
-    study = design(smoke_settings)
-    assert planned["learn_reward"] == sum(run.method == method for run in study.irl_runs)
-    assert planned["transfer"] == sum(run.irl.method == method for run in study.transfers)
+    assert stages(planned) == concerned
+    assert not DRAWN_FROM_NO_RUN & set(planned)
+
+
+def test_one_methods_logit_reruns_that_method(
+    smoke: Path, snakemake: Snakemake, change: Change, smoke_settings: Settings
+) -> None:
+    change("irl/methods/mt_csirl_lt.py", r"temperature / 2", "temperature / 3")
+    planned, whole = plan(snakemake), design(smoke_settings)
+    assert planned["learn_reward"] == sum(run.method == "mt_csirl_lt" for run in whole.irl_runs)
+    assert planned["transfer"] == sum(run.irl.method == "mt_csirl_lt" for run in whole.transfers)
     assert not {"train_expert", "train_sac", "collect_demonstrations"} & set(planned)
-    read = {name for name in ARTEFACTS if _reads(design(smoke_settings, name), method)}
-    assert set(planned) - {"learn_reward", "transfer", "score_reward"} == read | {"claims"}
+    shown = {name for name in ARTEFACTS if any(_method(run) == "mt_csirl_lt" for run in design(smoke_settings, name))}
+    assert set(planned) - RUNS == shown | {"claims"}
 
 
-def _reads(study: object, method: str) -> bool:
-    runs = [run.irl if isinstance(run, Transfer) else run for run in study]  # type: ignore[attr-defined]
-    return any(isinstance(run, IrlRun) and run.method == method for run in runs)
+def _method(run: object) -> str:
+    irl = run.irl if isinstance(run, Transfer) else run
+    return irl.method if isinstance(irl, IrlRun) else ""
 
 
-def test_an_edited_figure_is_drawn_again_alone(smoke: Path, snakemake: Snakemake, edit: Edit) -> None:
-    edit("figures/figure_3.py")
+def test_a_figure_is_drawn_again_alone(smoke: Path, snakemake: Snakemake, change: Change) -> None:
+    change("figures/figure_3.py", r"TITLE = ", 'TITLE = "" + ')
     assert plan(snakemake) == {"figure_3": 1}
 
 
-def test_an_edited_table_is_made_again_alone(smoke: Path, snakemake: Snakemake, edit: Edit) -> None:
-    edit("tables/table_2.py")
-    assert plan(snakemake) == {"table_2": 1}
+def test_a_style_sheet_redraws_figures_alone(smoke: Path, snakemake: Snakemake, change: Change) -> None:
+    change("figures/mtcsirl.mplstyle", r"\Z", "\nlines.linewidth: 1.7\n")
+    planned = plan(snakemake)
+    assert not stages(planned)
+    drawn = {name for name in ARTEFACTS if name.startswith("figure")}
+    assert drawn & set(planned) == drawn & set(TARGETS) if "all" not in TARGETS else drawn <= set(planned)
+    assert not {"table_2", "table_4", "table_5"} & set(planned)
 
 
-def test_an_edited_learner_reruns_every_run(
-    smoke: Path, snakemake: Snakemake, edit: Edit, smoke_settings: Settings
-) -> None:
-    edit("agents/sac.py")
-    assert plan(snakemake).items() >= design(smoke_settings).jobs().items()
+def test_a_table_is_made_again_alone(smoke: Path, snakemake: Snakemake, change: Change) -> None:
+    change("tables/table_4.py", r"REMARK = ", 'REMARK = "" + ')
+    assert plan(snakemake) == {"table_4": 1}
 
 
-CHANGES = {
+KEYS = {
+    "sac={discount: 0.9}": RUNS,
     "transfer={cs_weight: 0.5}": {"transfer"},
     "irl={iterations: 3}": {"learn_reward", "transfer", "score_reward"},
     "score={bootstrap: 21}": {"score_reward"},
     "baseline={steps: {default: 650}}": {"train_sac", "score_reward"},
-    "demonstrations={episodes: {single_target: 2}}": {
-        "collect_demonstrations",
-        "learn_reward",
-        "transfer",
-        "score_reward",
-    },
+    "progress={checkpoint_every: 77}": set(),
 }
 
 
-@pytest.mark.parametrize("change", CHANGES)
-def test_a_changed_key_reruns_what_depends_on_it(smoke: Path, snakemake: Snakemake, change: str) -> None:
-    planned = plan(snakemake, "--config", change)
-    assert {name for name in planned if name not in ARTEFACTS} - {"claims"} == CHANGES[change]
-    assert not {"figure_1", "figure_8", "figure_9"} & set(planned), "drawn from no run"
-
-
-def test_a_budget_of_one_task_reruns_that_task(smoke: Path, snakemake: Snakemake, smoke_settings: Settings) -> None:
-    planned = plan(snakemake, "--config", "transfer={steps: {push-back: 700}}")
-    assert planned["transfer"] == sum(run.task == "push-back" for run in design(smoke_settings).transfers)
+@pytest.mark.parametrize("key", KEYS)
+def test_a_changed_key_reruns_what_depends_on_it(smoke: Path, snakemake: Snakemake, key: str) -> None:
+    planned = plan(snakemake, "--config", key)
+    assert stages(planned) == KEYS[key]
+    assert not DRAWN_FROM_NO_RUN & set(planned), "drawn from no run"
 
 
 def test_an_added_seed_keeps_the_old_runs(smoke: Path, snakemake: Snakemake, smoke_settings: Settings) -> None:
@@ -99,15 +182,72 @@ def test_an_added_seed_keeps_the_old_runs(smoke: Path, snakemake: Snakemake, smo
     larger = design(smoke_settings.model_copy(update={"seeds": (0, 1), "irl_seeds": (0, 1)})).jobs()
     done = design(smoke_settings).jobs()
     for stage, count in larger.items():
-        assert planned.get(stage, 0) == count - done[stage]
+        kept = 0 if stage == "score_reward" else done[stage]  # scores read the policies of all seeds
+        assert planned.get(stage, 0) == count - kept, stage
 
 
 def test_a_lost_file_is_made_again(smoke: Path, snakemake: Snakemake) -> None:
-    lost = smoke / "results/smoke/tables/table_5.tex"
-    content, times = lost.read_bytes(), lost.stat()
-    lost.unlink()
-    try:
-        assert plan(snakemake) == {"table_5": 1}
-    finally:
-        lost.write_bytes(content)
-        os.utime(lost, ns=(times.st_atime_ns, times.st_mtime_ns))
+    for lost, jobs in (("tables/table_5.tex", {"table_5": 1}), ("sac/reach-wall-t0/s0/curve.csv", {"train_sac": 1})):
+        path = smoke / "results/smoke" / lost
+        content = path.read_bytes()
+        path.unlink()
+        try:
+            assert {name: n for name, n in plan(snakemake).items() if name in jobs} == jobs
+        finally:
+            path.write_bytes(content)
+    assert plan(snakemake) == {}
+
+
+def test_neither_times_nor_records_nor_place_decide(smoke: Path, snakemake: Snakemake, tmp_path: Path) -> None:
+    """A clone with results copied in, touched; without Snakemake's records; in another folder."""
+    copy = tmp_path / "elsewhere"
+    shutil.copytree(smoke, copy, ignore=shutil.ignore_patterns(".snakemake"))
+    for index, path in enumerate(sorted(copy.rglob("*"))):
+        os.utime(path, (1e9 + index % 7, 1e9 + index % 7))
+    done = snakemake("-n", *TARGETS, *SMOKE, cwd=copy)
+    assert "Nothing to be done" in done.stdout + done.stderr
+
+
+def test_touching_does_not_hide_what_is_stale(smoke: Path, snakemake: Snakemake) -> None:
+    key = ("--config", "sac={discount: 0.9}")
+    snakemake("--touch", "--cores", "1", *TARGETS, *SMOKE, *key)
+    assert stages(plan(snakemake, *key)) == RUNS
+
+
+def test_status_says_why(smoke: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.chdir(smoke)
+    command = ["status", "--scale", "smoke", "--target", "figure_2"]
+    assert cli.main([*command, "--set", "sac.discount=0.9"]) == 0
+    said = [line for line in capsys.readouterr().out.splitlines() if line.startswith("stale: sac/")]
+    assert len(said) == 1
+    assert "sac.discount: 0.97 -> 0.9" in said[0]
+
+
+FLIPPED = (
+    "sac/reach-wall-t0/s0/policy.safetensors",
+    "sac/reach-wall-t0/s0/evaluation.csv",
+    "demonstrations/velocity/reach-wall-t0/s0/demonstrations.parquet",
+    "irl/single_target/mt_csirl/velocity/reach-wall/s0/reward.safetensors",
+    "irl/single_target/mt_csirl/velocity/reach-wall/s0/samples.parquet",
+    "scores/single_target/mt_csirl/velocity/reach-wall/reach-wall-t0/s0/points.parquet",
+)
+
+
+@pytest.mark.parametrize("file", FLIPPED)
+def test_one_flipped_bit_is_refused_by_the_reader(smoke: Path, tmp_path: Path, file: str) -> None:
+    from mtcsirl.errors import UserError
+    from mtcsirl.files import storage
+
+    path = tmp_path / file
+    path.parent.mkdir(parents=True)
+    for name in (path.name, FILE):
+        shutil.copy(smoke / "results/smoke" / Path(file).parent / name, path.parent)
+    readers = {"safetensors": storage.read_tensors, "csv": storage.read_csv, "parquet": storage.read_parquet}
+    read = readers[path.suffix.removeprefix(".")]
+    read(path)
+    content = bytearray(path.read_bytes())
+    content[len(content) // 2] ^= 1
+    path.write_bytes(content)
+    with pytest.raises(UserError, match=f"{path.name}.*changed since its run wrote it") as caught:
+        read(path)
+    assert "\n" not in str(caught.value)

@@ -22,7 +22,10 @@ from tests.dag.conftest import RENDERED, RENDERS, SMOKE, Snakemake, needs_render
 
 pytestmark = pytest.mark.dag
 NOTE = "smoke scale: numbers mean nothing"
-METRICS = {"success": (0, 1), "velocity": (0, 2), "action_norm": (0, 4), "task_reward": (0, 10)}
+METRICS = {
+    "success": (0, 1), "velocity": (0, 2), "action_norm": (0, 4), "velocity_distance": (0, 2),
+    "action_norm_distance": (0, 3), "task_reward": (0, 10), "diverged": (0, 1),
+}  # fmt: skip
 Agent = Expert | Baseline | Transfer | IrlRun
 
 
@@ -87,7 +90,9 @@ def test_evaluation_has_one_row_per_policy_episode_and_metric(
     episodes = smoke_settings.evaluation.episodes
     for run in agents(study):
         frame = pd.read_csv(results / run.folder / "evaluation.csv", keep_default_na=False)
-        assert list(frame.columns) == ["task", "target", "cs_reward", "seed", "policy", "episode", "metric", "value"]
+        key = ["task", "target", "cs_reward", "seed", "policy", "kept"]
+        assert list(frame.columns) == [*key, "episode", "metric", "value"]
+        frame = frame[frame["kept"] == "kept"]
         members = run.members if isinstance(run, IrlRun) else ((run.task, run.target),)
         assert set(zip(frame["task"], frame["target"], strict=True)) == set(members)
         assert set(frame["policy"]) == {"stochastic", "deterministic"}

@@ -1,20 +1,22 @@
-"""Evaluation rows of a policy whose behaviour is known, and the gates."""
+"""Evaluation rows of policies whose behaviour is known, of simulations that diverge and of policies of NaN."""
 
 import numpy as np
 import pandas as pd
 import pytest
+from metaworld.policies import ENV_POLICY_MAP
 
 from mtcsirl.episodes.evaluation import (
     COLUMNS,
+    check_agent,
     evaluate,
-    gate_verdict,
+    evaluated,
     measure_episode,
-    relative_distance,
+    metrics,
     run_episode,
-    stochastic_means,
 )
 from mtcsirl.episodes.policy import Policy
-from mtcsirl.settings import GateSettings
+from mtcsirl.errors import UserError
+from mtcsirl.files.storage import write_csv
 from mtcsirl.settings.runs import AgentRunSettings
 from mtcsirl.worlds.environments import make_environment
 
@@ -27,6 +29,11 @@ def constant_policy(action, log_std=-3.0, observation="mapped"):
     return Policy((np.zeros((8, 39), dtype=np.float32),), (head,), observation=observation)
 
 
+@pytest.fixture(autouse=True)
+def _elsewhere(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)  # MuJoCo writes its log where it runs
+
+
 @pytest.fixture
 def settings():
     return AgentRunSettings(evaluation={"episodes": 3, "episode_steps": 60})
@@ -35,7 +42,9 @@ def settings():
 def test_rows(settings):
     rows = pd.DataFrame(evaluate(constant_policy([0.5, -0.5, 0.25, 0.0]), *KEY, settings))
     assert tuple(rows.columns) == COLUMNS
-    assert len(rows) == 2 * 3 * 4
+    assert len(rows) == 2 * 3 * 7
+    assert tuple(rows["metric"].unique()) == metrics()
+    assert set(rows["kept"]) == {"kept"}
     assert rows[["task", "target", "cs_reward", "seed"]].drop_duplicates().values.tolist() == [list(KEY)]
     pivot = rows.pivot_table(index=["policy", "episode"], columns="metric", values="value")
     assert pivot.loc["deterministic"].nunique().max() == 1
@@ -77,43 +86,96 @@ def test_episode_ends_with_the_environment():
     run_episode(constant_policy([0.0, 0.0, 0.0, 0.0]), env, 10_000, None)
 
 
-def test_stochastic_means_leave_the_deterministic_episodes_out():
-    rows = [
-        {"policy": policy, "metric": metric, "value": value}
-        for metric in ("success", "velocity", "action_norm", "task_reward")
-        for policy, value in (("stochastic", 1.0), ("stochastic", 2.0), ("deterministic", 30.0))
-    ]
-    assert stochastic_means(rows) == dict.fromkeys(("success", "velocity", "action_norm", "task_reward"), 1.5)
+def test_distance_counts_every_step_on_the_wrong_side():
+    """Norms that alternate between 2 and 4 have the mean of a policy on target, and are 1 away at every step."""
+    zeros, on_target = np.zeros((6, 39)), np.full((6, 4), 0.75)
+    alternating = np.tile([[0.5] * 4, [1.0] * 4], (3, 1))
+    far, near = (measure_episode(action, zeros, np.ones(6), True, "raw") for action in (alternating, on_target))
+    assert far["action_norm"] == near["action_norm"] == pytest.approx(3.0)
+    assert far["action_norm_distance"] == pytest.approx(1.0)
+    assert near["action_norm_distance"] == pytest.approx(0.0)
+    assert far["velocity_distance"] == pytest.approx(0.8), "the hand does not move"
 
 
-@pytest.mark.parametrize(
-    ("gate", "success", "velocity", "passed"),
-    [
-        ("expert", 0.9, 0.69, True),
-        ("expert", 0.89, 0.8, False),
-        ("expert", 1.0, 0.67, False),
-        ("expert", 1.0, 0.93, False),
-        ("generator", 1.0, 0.61, True),
-        ("generator", 1.0, 0.59, False),
-        ("sac", 0.9, 0.0, True),
-        ("sac", 0.8, 0.8, False),
-    ],
-)
-def test_gates(gate, success, velocity, passed):
-    means = {"success": success, "velocity": velocity, "action_norm": 1.0, "task_reward": 5.0}
-    verdict = gate_verdict(gate, means, "velocity", GateSettings())
-    assert set(verdict) == {"gate", "passed", "success", "metric", "limits"}
-    assert verdict["passed"] is passed
-    assert verdict["metric"] == (None if gate == "sac" else velocity)
+class Disturbed:
+    """A policy beside which the simulation blows up at one step: its actions are finite throughout."""
+
+    def __init__(self, policy, env, step):
+        self.policy, self.env, self.left, self.observation = policy, env, step, policy.observation
+
+    def act(self, observation, generator=None):
+        if self.left == 0:
+            self.env.simulator.data.qvel[:] = 1e12
+        self.left -= 1
+        return self.policy.act(observation, generator)
 
 
-def test_action_norm_has_its_own_limit():
-    means = {"success": 1.0, "velocity": 0.8, "action_norm": 3.14, "task_reward": 5.0}
-    assert gate_verdict("expert", means, "action_norm", GateSettings())["passed"]
-    assert not gate_verdict("expert", means | {"action_norm": 3.16}, "action_norm", GateSettings())["passed"]
-    assert relative_distance(3.3, "action_norm") == pytest.approx(0.1)
+def test_a_simulation_that_diverges_is_a_failed_episode_measured_before_that():
+    policy, env = constant_policy([0.5, -0.5, 0.25, 0.0]), make_environment("reach", 0)
+    whole = run_episode(policy, env, 20, None)
+    cut = run_episode(Disturbed(policy, env, 20), env, 60, None)
+    assert (whole["diverged"], cut["diverged"]) == (0.0, 1.0)
+    assert {name: value for name, value in cut.items() if name != "diverged"} == {
+        name: value for name, value in whole.items() if name != "diverged"
+    }
+    assert all(np.isfinite(list(cut.values())))
 
 
-def test_unknown_gate_is_an_error():
-    with pytest.raises(ValueError, match="unknown gate"):
-        gate_verdict("door", {"success": 1.0}, "velocity", GateSettings())
+class Shutting:
+    """Meta-World's hand-written policy for the drawer."""
+
+    observation = "raw"
+
+    def __init__(self):
+        self.script = ENV_POLICY_MAP["drawer-close-v3"]()
+
+    def act(self, observation, generator=None):
+        return np.clip(self.script.get_action(observation.astype(np.float64)), -1, 1).astype(np.float32)
+
+
+def test_success_before_the_simulation_diverged_does_not_count():
+    env = make_environment("drawer-close", 0, observation="raw")
+    whole, cut = (run_episode(policy, env, 200, None) for policy in (Shutting(), Disturbed(Shutting(), env, 190)))
+    assert (whole["success"], whole["diverged"]) == (1.0, 0.0)
+    assert (cut["success"], cut["diverged"]) == (0.0, 1.0)
+
+
+def test_the_first_step_diverging_leaves_nothing_to_measure():
+    env = make_environment("reach", 0)
+    with pytest.raises(UserError, match="diverged at the first step"):
+        run_episode(Disturbed(constant_policy([0.1] * 4), env, 0), env, 60, None)
+
+
+def test_a_policy_of_nan_is_refused_by_name_where_it_would_have_closed_the_drawer(settings):
+    """MuJoCo resets itself at every NaN and the arm falls on the drawer: success 1.0 without a policy."""
+    broken = constant_policy([np.nan] * 4)
+    with pytest.raises(UserError, match=r"policy of drawer-close-t3, seed 7: step 0: .*nan.* not finite") as error:
+        evaluate(broken, *KEY, settings)
+    assert "\n" not in str(error.value)
+    env = make_environment("drawer-close", 3)
+    env.reset()
+    fallen = [env.step(np.full(4, np.nan))[4] for _ in range(60)]
+    assert any(info["success"] for info in fallen), "what the check is for"
+    evaluate(constant_policy([0.1] * 4), *KEY, settings)
+
+
+def test_the_last_policy_has_rows_of_its_own_with_the_same_random_numbers(settings):
+    policy = constant_policy([0.1, 0.1, 0.1, 0.1])
+    kept, last = evaluate(policy, *KEY, settings), evaluate(policy, *KEY, settings, "last")
+    assert {row["kept"] for row in last} == {"last"}
+    assert [row | {"kept": "kept"} for row in last] == kept
+
+
+def test_a_folder_says_whose_evaluation_it_holds(settings, tmp_path):
+    rows = pd.DataFrame(evaluate(constant_policy([0.1] * 4), *KEY, settings), columns=list(COLUMNS))
+    assert evaluated(tmp_path) is None
+    check_agent(tmp_path, "reach", 0, "action_norm")  # a policy of one's own says nothing
+    write_csv(tmp_path / "evaluation.csv", rows)
+    assert evaluated(tmp_path) == KEY
+    check_agent(tmp_path, *KEY[:3])
+    for other in (("reach", 3, "velocity"), ("drawer-close", 0, "velocity"), ("drawer-close", 3, "action_norm")):
+        with pytest.raises(UserError, match="holds an expert of velocity on drawer-close-t3, not"):
+            check_agent(tmp_path, *other)
+    write_csv(tmp_path / "evaluation.csv", pd.concat([rows, rows.assign(seed=8)]))
+    with pytest.raises(UserError, match="holds 2 agents"):
+        evaluated(tmp_path)

@@ -9,7 +9,7 @@ from stable_baselines3 import SAC
 
 from mtcsirl.agents.sac import FusedSac
 from mtcsirl.cli import main
-from mtcsirl.episodes.policy import load_policy, save_policy
+from mtcsirl.episodes.policy import finite_action, load_policy, save_policy
 from mtcsirl.errors import UserError
 from mtcsirl.exports.sb3 import export_sb3
 from mtcsirl.worlds.environments import OBSERVATION_MAPS, make_environment
@@ -60,6 +60,7 @@ def test_truncated_weights_are_one_line(policy, tmp_path, size):
         ("sizes", None, "policy.json"),
         ("observation", "upside-down", "policy.json"),
         ("min_log_std", "low", "policy.json"),
+        ("max_log_std", float("nan"), "policy.json"),
     ],
 )
 def test_tampered_description_is_refused(policy, tmp_path, key, value, file):
@@ -68,6 +69,29 @@ def test_tampered_description_is_refused(policy, tmp_path, key, value, file):
     (tmp_path / "policy.json").write_text(json.dumps(description | {key: value}))
     with pytest.raises(UserError, match=file):
         load_policy(tmp_path)
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+@pytest.mark.parametrize("layer", ["weight_1", "bias_0"])
+def test_weights_that_are_not_finite_are_one_line(policy, tmp_path, layer, value):
+    tensors = policy.tensors()
+    save_policy(policy, tmp_path / "good")
+    load_policy(tmp_path / "good")
+    tensors[layer].view(-1)[3] = value
+    save_policy(policy.with_tensors(tensors), tmp_path)
+    with pytest.raises(UserError, match=rf"policy\.safetensors: {layer} hold numbers that are not finite") as error:
+        load_policy(tmp_path)
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.filterwarnings("ignore:overflow", "ignore:invalid value")
+def test_a_policy_whose_weights_overflow_is_named(policy, observations):
+    weights = [np.full_like(weight, 3e38) for weight in policy.weights]
+    weights[-1][:, ::2] *= -1  # inf - inf
+    huge = replace(policy, weights=tuple(weights))
+    with pytest.raises(UserError, match=r"reach-t0: step 3: the action .* is not finite"):
+        finite_action(huge, np.abs(observations[0]), np.random.default_rng(0), "reach-t0: step 3")
+    assert np.isfinite(finite_action(policy, observations[0], None, "")).all()
 
 
 def test_missing_policy_is_one_line(tmp_path):

@@ -27,6 +27,7 @@ def demonstrations(tmp_path: Path) -> Path:
             "task_reward": float(step),
             "task": "reach",
             "target": 3,
+            "cs_reward": "velocity",
             "episode": episode,
             "step": step,
             "success": step == STEPS - 1,
@@ -65,3 +66,40 @@ def test_a_dataset_is_not_overwritten(demonstrations: Path, tmp_path: Path, monk
     export_minari(demonstrations, tmp_path / "datasets")
     with pytest.raises(UserError, match="already holds mtcsirl/reach-t3-v0"):
         export_minari(demonstrations, tmp_path / "datasets")
+
+
+@pytest.mark.parametrize(
+    "name", ["foo", "bad name-v0", "ü/x-v0", "../out-v0", "/tmp/out-v0", "a//b-v0", "x-v", "", "x-v0/"]
+)
+def test_a_name_that_is_no_id_is_one_line_and_leaves_nothing(
+    demonstrations: Path, tmp_path: Path, name: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("MINARI_DATASETS_PATH", "")
+    folder = tmp_path / "datasets"
+    options = ["--demonstrations", str(demonstrations), "--output", str(folder)]
+    assert main(["export-demonstrations", *options, "--name", name]) == 2
+    error = capsys.readouterr().err
+    assert error.count("\n") == 1
+    assert f"--name {name}: must be letters" in error
+    assert not folder.exists()
+    assert main(["export-demonstrations", *options, "--name", "mine/foo-v0"]) == 0, "the next correct call succeeds"
+    assert (folder / "mine/foo-v0").is_dir()
+
+
+def test_a_dataset_that_could_not_be_made_leaves_nothing(demonstrations: Path, tmp_path: Path) -> None:
+    frame = storage.read_parquet(demonstrations)
+    frame["action"] = [row[:2] if i % 2 else row for i, row in enumerate(frame["action"])]
+    storage.write_parquet(demonstrations, frame)
+    folder = tmp_path / "datasets"
+    with pytest.raises(UserError, match="not readable as demonstrations"):
+        export_minari(demonstrations, folder)
+    assert not list(folder.rglob("*"))
+
+
+def test_datasets_below_one_folder_are_all_found(
+    demonstrations: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = tmp_path / "datasets"
+    names = [export_minari(demonstrations, folder, name) for name in ("mine/a-v0", "mine/b-v0", "c-v0")]
+    monkeypatch.setenv("MINARI_DATASETS_PATH", str(folder))
+    assert set(names) <= set(minari.list_local_datasets())

@@ -1,5 +1,6 @@
 """Rendered figures: upright, not mirrored, and pointing where they say."""
 
+import ctypes.util
 import os
 import subprocess
 import sys
@@ -49,19 +50,58 @@ def test_unknown_camera_names_the_allowed_ones(environment):
         camera_pose(environment.simulator.model, environment.simulator.data, "ceiling")
 
 
-def test_machine_without_osmesa_is_told_the_package():
+NEEDS_OSMESA = pytest.mark.skipif(ctypes.util.find_library("OSMesa") is None, reason="libosmesa6 is not installed")
+
+
+def _drawn(before: str = "", **variables: str) -> str:
+    """What a process prints that draws an empty scene under these environment variables."""
     program = (
-        "from mtcsirl.worlds.rendering import SceneRenderer\n"
+        f"{before}\n"
         "from mtcsirl.errors import UserError\n"
-        "import mujoco\n"
-        "try:\n    SceneRenderer(mujoco.MjModel.from_xml_string('<mujoco/>'), width=8, height=8)\n"
+        "try:\n"
+        "    from mtcsirl.worlds.variables import backend\n    import os\n    backend(os.environ)\n"
+        "    import mujoco\n    from mtcsirl.worlds.rendering import SceneRenderer\n"
+        "    SceneRenderer(mujoco.MjModel.from_xml_string('<mujoco/>'), width=8, height=8).close()\n"
+        "    print('drawn')\n"
         "except UserError as error:\n    print(error)\n"
     )
-    # PyOpenGL refuses OSMesa when told to use another platform, as it does when the library is missing.
-    changed = {name: value for name, value in os.environ.items() if name != "MUJOCO_GL"} | {"PYOPENGL_PLATFORM": "x11"}
-    done = subprocess.run([sys.executable, "-c", program], env=changed, capture_output=True, text=True, check=True)
-    assert "apt-get install libosmesa6" in done.stdout
-    assert done.stdout.count("\n") == 1
+    own = {
+        name: value for name, value in os.environ.items() if name not in ("MUJOCO_GL", "PYOPENGL_PLATFORM", "DISPLAY")
+    }
+    done = subprocess.run(
+        [sys.executable, "-c", program], env=own | variables, capture_output=True, text=True, check=True
+    )
+    assert done.stdout.count("\n") == 1, done.stdout
+    return done.stdout
+
+
+def test_machine_without_osmesa_is_told_the_package():
+    hidden = """
+import ctypes
+class WithoutOsmesa(ctypes.CDLL):
+    def __init__(self, name, *rest, **more):
+        if name and "OSMesa" in str(name):
+            raise OSError(f"{name}: cannot open shared object file")
+        super().__init__(name, *rest, **more)
+ctypes.CDLL, ctypes.cdll = WithoutOsmesa, ctypes.LibraryLoader(WithoutOsmesa)
+"""
+    assert "apt-get install libosmesa6" in _drawn(hidden)
+
+
+@pytest.mark.parametrize(
+    ("variables", "says"),
+    [
+        ({"PYOPENGL_PLATFORM": "egl"}, "PYOPENGL_PLATFORM=egl: pictures are drawn by osmesa; unset it"),
+        ({"MUJOCO_GL": "egl", "PYOPENGL_PLATFORM": "osmesa"}, "PYOPENGL_PLATFORM=osmesa: MUJOCO_GL=egl draws by egl;"),
+        ({"MUJOCO_GL": "nonsense"}, "MUJOCO_GL=nonsense: MuJoCo knows no such back end; unset it"),
+        ({"MUJOCO_GL": "glfw"}, "MUJOCO_GL=glfw: draws by glfw and needs a display"),
+        pytest.param({"MUJOCO_GL": "off"}, "drawn", marks=NEEDS_OSMESA),
+        pytest.param({"MUJOCO_GL": "osmesa", "PYOPENGL_PLATFORM": "osmesa"}, "drawn", marks=NEEDS_OSMESA),
+    ],
+    ids=str,
+)
+def test_a_variable_that_keeps_pictures_from_being_drawn_is_named(variables, says):
+    assert says in _drawn(**variables)
 
 
 def test_sawyer_arrow_ends_between_the_fingers():

@@ -18,7 +18,7 @@ from mtcsirl.figures.style import (
     quantity_label,
     styled,
 )
-from mtcsirl.settings.study import METHODS
+from mtcsirl.names import METHODS
 
 # Linear RGB as a person without red or without green receptors sees it (Machado et al. 2009, severity 1).
 PROTAN = np.array([[0.152286, 1.052583, -0.204868], [0.114503, 0.786281, 0.099216], [-0.003882, -0.048116, 1.051998]])

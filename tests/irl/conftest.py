@@ -10,6 +10,7 @@ from mtcsirl.files.storage import write_parquet
 from mtcsirl.settings import (
     DiscriminatorSettings,
     EvaluationSettings,
+    GeneratorSettings,
     IrlSettings,
     LearnerSettings,
     ProgressSettings,
@@ -28,7 +29,8 @@ def demonstrations(tmp_path_factory) -> list[Path]:
     files = []
     for task, target in MEMBERS:
         files.append(folder / f"{task}.parquet")
-        write_parquet(files[-1], collect_demonstrations(policy, task, target, settings, seed=target))
+        frame = collect_demonstrations(policy, task, target, settings, seed=target, cs_reward="velocity")
+        write_parquet(files[-1], frame)
     return files
 
 
@@ -45,10 +47,11 @@ def irl_settings(**irl) -> IrlRunSettings:
         "centre": True,
         "discriminator": discriminator,
     } | irl
+    generators = GeneratorSettings(**{name: chosen.pop(name) for name in GeneratorSettings.model_fields if name in irl})
     settings = IrlSettings(**chosen)
     learner = LearnerSettings(hidden_sizes=(16, 16), minibatch=32, random_steps=30)
     return IrlRunSettings(
-        sac=settings.scaling().sac(learner),
+        sac=generators.scaling().sac(learner),
         irl=settings,
         demonstration_episodes=2,
         evaluation=EvaluationSettings(episodes=1, episode_steps=60),

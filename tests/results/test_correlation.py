@@ -5,7 +5,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
-from mtcsirl.results.correlation import epic_distance, epic_values, nuisance, pearson, remove, spearman, views
+from mtcsirl.results.correlation import (
+    epic_distance,
+    epic_values,
+    nuisance,
+    partial_correlation,
+    pearson,
+    remove,
+    spearman,
+    views,
+)
 from mtcsirl.transitions import Transitions
 
 DISCOUNT = 0.9
@@ -53,10 +62,42 @@ def test_what_does_not_vary_has_no_correlation():
     assert np.isnan(spearman(np.full(5, 0.1), np.arange(5.0)))
 
 
+@given(st.lists(st.tuples(floats, floats, floats), min_size=5, max_size=30))
+def test_partial_correlation_is_that_of_what_a_line_in_t_leaves(triples):
+    f, c, t = np.array(triples, dtype=float).T
+    line = np.column_stack([np.ones_like(t), t])
+    rest = [x - line @ np.linalg.lstsq(line, x, rcond=None)[0] for x in (f, c)]
+    if min(np.std(rest[0]), np.std(rest[1]), np.std(t)) < 0.05:
+        return
+    assert partial_correlation(f, c, t) == pytest.approx(stats.pearsonr(*rest).statistic, abs=1e-6)
+
+
+def test_partial_correlation_sees_what_r_hides():
+    """f = -r_task correlates with a truth that slow policies please, and says nothing beyond r_task."""
+    random = np.random.default_rng(0)
+    t, own = random.normal(size=(2, 500))
+    truth = own - 2 * t
+    assert pearson(-t, truth) > 0.85
+    assert np.isnan(partial_correlation(-t, truth, t))
+    assert np.isnan(partial_correlation((3 - 0.7 * t).astype(np.float32).astype(float), truth, t.astype(np.float32)))
+    assert partial_correlation(own - t, truth, t) == pytest.approx(1.0)
+    assert partial_correlation(t - own, truth, t) == pytest.approx(-1.0)
+    noise = random.normal(size=500)
+    assert abs(partial_correlation(noise - 5 * t, truth, t)) < 0.1
+
+
+def test_partial_correlation_where_something_does_not_vary():
+    x, y, one = np.arange(6.0), np.array([1.0, 0, 2, 5, 3, 4]), np.ones(6)
+    assert partial_correlation(x, y, one) == pearson(x, y), "r_task that does not vary explains nothing"
+    assert np.isnan(partial_correlation(one, y, x))
+    assert np.isnan(partial_correlation(x, one, y))
+    assert np.isnan(partial_correlation(one, one, x))
+
+
 def test_removal_finds_the_truth_under_task_reward_and_shaping(transitions):
     learned, true = arrays(transitions, shaped, truth)
     both = views(learned, true, transitions, DISCOUNT)
-    value = {name: measure(x, y) for name, (measure, x, y) in both.pairs.items()}
+    value = {name: measure(*vectors) for name, (measure, vectors) in both.parts.items()}
     assert value["pearson"] < 0.4
     assert value["pearson_residual"] == pytest.approx(1.0, abs=1e-6)
     assert value["spearman_residual"] == pytest.approx(1.0, abs=1e-4)
@@ -65,13 +106,14 @@ def test_removal_finds_the_truth_under_task_reward_and_shaping(transitions):
 def test_removal_leaves_nothing_of_pure_shaping_and_task_reward(transitions):
     learned, true = arrays(transitions, lambda t: shaped(t) - 0.5 * truth(t), truth)
     both = views(learned, true, transitions, DISCOUNT)
-    assert np.isnan(both.pairs["pearson_residual"][0](*both.pairs["pearson_residual"][1:]))
+    measure, vectors = both.parts["pearson_residual"]
+    assert np.isnan(measure(*vectors))
 
 
 def test_removal_with_the_wrong_discount_leaves_some(transitions):
     learned, true = arrays(transitions, shaped, truth)
-    off = views(learned, true, transitions, 0.5).pairs["pearson_residual"]
-    assert off[0](*off[1:]) < 0.9
+    measure, vectors = views(learned, true, transitions, 0.5).parts["pearson_residual"]
+    assert measure(*vectors) < 0.9
 
 
 def test_residual_is_orthogonal_to_what_was_removed(transitions):

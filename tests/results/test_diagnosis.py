@@ -37,6 +37,7 @@ def _gate(passed: bool) -> dict[str, object]:
 @pytest.mark.parametrize(
     ("accuracy", "passed", "expected"),
     [
+        (float("nan"), True, "no number"), (float("nan"), False, "no number"),
         (1.0, False, "saturated"), (0.99, True, "saturated"), (0.98, True, "at work"), (0.56, False, "at work"),
         (0.55, True, "matched"), (0.5, False, "asleep"), (0.3, False, "asleep"),
     ],
@@ -57,6 +58,31 @@ def test_one_side_right_and_the_other_wrong_is_no_better_than_chance() -> None:
     rows.loc[rows["metric"] == "accuracy_expert", "value"] = 1.0
     (found,) = diagnose(rows, [_gate(False)]).to_dict("records")
     assert found["state"] == "asleep"
+
+
+@pytest.mark.parametrize("metric", ["accuracy_expert", "f_generator_mean"])
+def test_one_iteration_without_a_number_is_no_state(metric) -> None:
+    rows = _rows(0.8)
+    assert diagnose(rows, [_gate(True)])["state"].tolist() == ["at work"]
+    rows.loc[(rows["metric"] == metric) & (rows["step"] == 18_000), "value"] = float("nan")
+    assert diagnose(rows, [_gate(True)])["state"].tolist() == ["no number"]
+
+
+def test_what_lacks_a_generator_is_one_line(tmp_path) -> None:
+    run = next(run for run in design(Settings()).irl_runs if run.source == "reach-wall")
+    rows = _rows(1.0).assign(task=run.members[0][0])
+    storage.write_json(tmp_path / run.folder / "gate.json", {"members": [_gate(True) | {"task": run.members[0][0]}]})
+    storage.write_csv(tmp_path / run.folder / "diagnostics.csv", rows)
+    read_diagnoses([run], tmp_path)
+    for broken in (rows.assign(task="push"), rows[rows["metric"] != "temperature"]):
+        storage.write_csv(tmp_path / run.folder / "diagnostics.csv", broken)
+        with pytest.raises(UserError, match=r"gate\.json or diagnostics\.csv lacks") as error:
+            read_diagnoses([run], tmp_path)
+        assert "\n" not in str(error.value)
+    storage.write_csv(tmp_path / run.folder / "diagnostics.csv", rows)
+    storage.write_json(tmp_path / run.folder / "gate.json", {"passed": True})
+    with pytest.raises(UserError, match="lacks 'members'"):
+        read_diagnoses([run], tmp_path)
 
 
 def test_the_runs_of_a_study_are_read_and_counted(tmp_path) -> None:

@@ -1,10 +1,10 @@
 import numpy as np
 import pytest
 
+from mtcsirl.names import CS_REWARDS, METHODS, SINGLE_TASKS, TRAIN_TASKS
 from mtcsirl.results.published import load_published
 from mtcsirl.results.statistics import prediction_interval
 from mtcsirl.rewards.ground_truth import COMMON_SENSE_REWARDS
-from mtcsirl.settings.study import CS_REWARDS, METHODS, SINGLE_TASKS, TRAIN_TASKS
 
 PAPER = load_published()
 

@@ -5,7 +5,8 @@ import pandas as pd
 import pytest
 from scipy import stats
 
-from mtcsirl.results.reward_quality import KEY, quality_markdown, reward_quality
+from mtcsirl.results.correlation import partial_correlation, pearson
+from mtcsirl.results.reward_quality import KEY, quality_markdown, read_quality, reward_quality
 
 NAMED = dict(zip(KEY, ("multi_task", "mt_csirl", "velocity", "all", "reach", "sac"), strict=True))
 
@@ -19,7 +20,12 @@ def _points(seeds: int, noise: float, episodes: int = 6, steps: int = 40) -> pd.
         frames.append(
             pd.DataFrame(
                 {"truth": truth, "learned": learned, "truth_rest": truth, "learned_rest": -learned, "seed": seed}
-            ).assign(episode=np.repeat(np.arange(episodes), steps), **NAMED)
+            ).assign(
+                task_reward=0.5 * truth + random.normal(size=len(truth)),
+                agent=np.repeat(np.arange(episodes) % 2, steps),
+                episode=np.repeat(np.arange(episodes), steps),
+                **NAMED,
+            )
         )
     return pd.concat(frames, ignore_index=True)
 
@@ -43,11 +49,53 @@ def test_the_correlation_over_seeds_is_the_mean_of_the_seeds_own(rows) -> None:
     assert rows.loc["pearson_residual", "value"] == pytest.approx(-np.mean(own))
 
 
+def test_partial_and_gain_are_means_of_the_seeds_own(rows) -> None:
+    columns = ("learned", "truth", "task_reward")
+    seeds = [[group[name].to_numpy() for name in columns] for _, group in _points(3, 1.0).groupby("seed")]
+    own = [partial_correlation(*vectors) for vectors in seeds]
+    assert rows.loc["partial", "value"] == pytest.approx(np.mean(own))
+    assert rows.loc["gain", "value"] == pytest.approx(np.mean([pearson(f, c) - pearson(-t, c) for f, c, t in seeds]))
+
+
+def test_a_reward_that_repeats_the_task_gains_nothing_beyond_it() -> None:
+    points = _points(3, 1.0)
+    told = reward_quality(points.assign(learned=-2 * points["task_reward"]), _scores(3), 100).set_index("statistic")
+    assert np.isnan(told.loc["partial", "value"])
+    assert told.loc["gain", "value"] == pytest.approx(0.0, abs=1e-9)
+    mixed = points.assign(learned=-5 * points["task_reward"] + 0.1 * points["truth"].to_numpy()[::-1])
+    mixed = reward_quality(mixed, _scores(3), 200).set_index("statistic")
+    assert abs(mixed.loc["pearson", "value"]) > 0.3
+    assert mixed.loc["partial", "low"] < 0 < mixed.loc["partial", "high"]
+
+
+def test_order_of_rows_does_not_matter(rows) -> None:
+    shuffled = _points(3, 1.0).sample(frac=1.0, random_state=0)
+    again = reward_quality(shuffled, _scores(3), 10).set_index("statistic")
+    assert again["value"].to_numpy() == pytest.approx(rows["value"].to_numpy())
+
+
+def test_agents_are_clusters_within_seeds() -> None:
+    """Twelve episodes of two agents that differ are two observations, not twelve."""
+    points = _points(2, 0.5, episodes=12, steps=5)
+    points["learned"] += 10.0 ** points["seed"] * 6 * points["agent"]
+    alone = points.assign(agent=points["episode"])
+    wide, narrow = (reward_quality(frame, _scores(2), 400).set_index("statistic") for frame in (points, alone))
+    width = [frame.loc["pearson", "high"] - frame.loc["pearson", "low"] for frame in (wide, narrow)]
+    assert width[0] > 1.2 * width[1]
+
+
+def test_nothing_scored_is_an_empty_table(tmp_path) -> None:
+    rows = read_quality([], tmp_path, 10)
+    assert rows.empty
+    assert "No reward was scored yet." in quality_markdown(rows)
+
+
 def test_scales_of_seeds_do_not_matter_and_intervals_hold_the_value(rows) -> None:
     assert rows.loc["pearson", "value"] > 0.6
     for name in ("pearson", "spearman", "pearson_residual"):
         assert rows.loc[name, "low"] < rows.loc[name, "value"] < rows.loc[name, "high"]
     assert (rows["seeds"] == 3).all()
+    assert (rows["agents"] == 6).all()
     assert (rows["episodes"] == 18).all()
 
 

@@ -3,19 +3,29 @@
 import json
 import subprocess
 import sys
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import pytest
 import yaml
-from pydantic import ValidationError
+from pydantic import BaseModel, ValidationError
 
 from mtcsirl.errors import UserError
-from mtcsirl.irl.methods import METHODS
+from mtcsirl.extensions import METHODS
+from mtcsirl.names import EXPERIMENTS
 from mtcsirl.rewards.ground_truth import COMMON_SENSE_REWARDS
 from mtcsirl.settings import Settings, granted
 from mtcsirl.settings.loading import load, merge, override, read_yaml, validate
-from mtcsirl.settings.runs import irl_run
+from mtcsirl.settings.runs import (
+    IrlRunSettings,
+    baseline_run,
+    demonstration_run,
+    expert_run,
+    irl_run,
+    score_run,
+    transfer_run,
+)
 from mtcsirl.settings.template import as_json, deviations, keys, schema, template
 
 
@@ -57,8 +67,6 @@ def test_paper_scale_has_the_published_numbers(checkout: Path) -> None:
     assert (paper.sac.min_log_std, paper.sac.max_log_std) == (table["min_log_std"], table["max_log_std"])
     assert paper.sac.polyak == table["tau"]
     assert paper.expert.temperature == paper.baseline.temperature == "automatic"
-    assert paper.irl.discriminator_updates == irl["single_target"]["discriminator_updates"]
-    assert paper.irl.generator_updates == irl["single_target"]["generator_updates"]
     assert paper.irl.curriculum_window == irl["curriculum"]["window"]
     assert len(paper.seeds) == irl["single_target"]["seeds"]
     assert list(paper.multi_task.train_tasks) == irl["multi_task"]["train_tasks"]
@@ -114,7 +122,48 @@ BAD: list[tuple[dict[str, Any], str]] = [
     ({"methods": "mt_airl"}, "methods = 'mt_airl': must be a list"),
     ({"cs_rewards": ["speed"]}, "unknown common-sense reward 'speed'; allowed: velocity, action_norm"),
     ({"scale": "big"}, "scale = 'big': must be 'smoke', 'desk' or 'paper'"),
+    ({"sac": {"device": "gpu"}}, "sac.device = 'gpu': must be cpu, cuda or cuda:INDEX"),
+    ({"sac": {"device": "cuda:-1"}}, "sac.device = 'cuda:-1': must be cpu, cuda or cuda:INDEX"),
+    ({"sac": {"hidden_sizes": [0]}}, "sac.hidden_sizes.0 = 0: must be greater than 0"),
+    ({"sac": {"hidden_sizes": []}}, "sac.hidden_sizes = []: must not be empty"),
+    (
+        {"irl": {"discriminator": {"hidden_sizes": [8, 0]}}},
+        "irl.discriminator.hidden_sizes.1 = 0: must be greater than 0",
+    ),
+    ({"irl": {"discriminator": {"bottleneck_hidden_sizes": [0]}}}, "bottleneck_hidden_sizes.0 = 0: must be greater"),
+    ({"sac": {"min_log_std": 3}}, "sac: min_log_std = 3 must be below max_log_std = 2"),
+    ({"sac": {"min_log_std": 2, "max_log_std": 2}}, "sac: min_log_std = 2 must be below max_log_std = 2"),
+    (
+        {"environment": {"target_seed": 4294967296}},
+        "environment.target_seed = 4294967296: must be less than or equal to 4294967295",
+    ),
+    ({"seeds": [12345678901234567890123]}, "seeds.0 = 12345678901234567890123: must be less than or equal to"),
+    ({"irl_seeds": [2**53]}, "irl_seeds.0 = 9007199254740992: must be less than or equal to 9007199254740991"),
+    ({"multi_target": {"train_targets": [0, 1]}}, "multi_target: train_targets holds 0, the new target"),
+    ({"multi_target": {"train_targets": [0]}}, "multi_target: train_targets holds 0, the new target"),
+    ({"results": ""}, "results = '': must not be empty"),
+    ({"results": " "}, "results = ' ': must not be empty"),
+    ({"results": "~/study"}, "results = '~/study': ~ and variables are not expanded here; write "),
+    ({"results": "$HOME/s"}, "results = '$HOME/s': ~ and variables are not expanded here; write "),
+    ({"figures": "${HOME}/s"}, "figures = '${HOME}/s': ~ and variables are not expanded here"),
+    ({"results": "a{x}"}, "results = 'a{x}': must not hold the character '{'"),
+    ({"figures": "a<results>"}, "figures = 'a<results>': must not hold the character '<'"),
+    ({"results": "-x"}, "results = '-x': would be taken for an option"),
+    ({"results": "./-x"}, "results = './-x': would be taken for an option"),
+    ({"results": "a\nb"}, "must not hold the character '\\n'"),
 ]
+
+
+@pytest.mark.parametrize("path", ["~/mine.py", "$HOME/mine.py", "a{x}.py", "a:b.py"])
+def test_a_path_of_an_extension_is_taken_as_it_is_written(path: str) -> None:
+    with pytest.raises(UserError, match=r"^(configuration|extensions): .*"):
+        validate(Settings, {"extensions": [path]})
+
+
+@pytest.mark.parametrize("path", ["my study", "Übung/1", "it's", 'say "x"', "2026_11_26", "a$", "x~", "/tmp/a,b;c&d"])
+def test_an_unusual_path_is_no_mistake(path: str) -> None:
+    assert validate(Settings, {"results": path}).results == path
+    assert validate(Settings, {"results": f"{path}/"}).results == path
 
 
 @pytest.mark.parametrize(("data", "says"), BAD, ids=[says.split(":")[0] for _, says in BAD])
@@ -206,7 +255,9 @@ def test_a_run_warms_up_as_long_as_its_slowest_task_asks() -> None:
     assert irl_run(study, "multi_task", ["reach"]) != irl_run(study, "multi_task", ["plate-slide"])
 
 
-@pytest.mark.parametrize("module", ["settings.loading", "design", "plan", "status", "cli"])
+@pytest.mark.parametrize(
+    "module", ["settings.loading", "study.design", "study.plan", "study.status", "study.artefacts", "cli"]
+)
 def test_settings_and_study_import_neither_torch_nor_snakemake(module: str) -> None:
     """Snakemake reads them once per job, a shell at every --help."""
     code = (
@@ -220,3 +271,78 @@ def test_settings_and_study_import_neither_torch_nor_snakemake(module: str) -> N
 def test_no_task_slips_through_the_smoke_scales_budget(section: str) -> None:
     """An overlay merges mappings: a task that gets a budget of its own at desk scale has to be named there too."""
     assert set(getattr(load(scale="smoke"), section).steps.values()) == {400}
+
+
+def test_a_key_of_the_generators_stands_once_per_run() -> None:
+    """Temperature and scale of a run's generators are those of its ``sac``; the study has them under ``irl``."""
+    study = validate(Settings, {"irl": {"temperature": "automatic", "initial_temperature": 0.5, "reward_scale": 0.2}})
+    run = irl_run(study, "single_target", ["reach"])
+    assert (run.sac.temperature, run.sac.initial_temperature, run.sac.reward_scale) == ("automatic", 0.1, 0.2)
+    for name in ("temperature", "initial_temperature", "reward_scale"):
+        with pytest.raises(UserError, match=rf"irl\.{name} = .*unknown key"):
+            validate(IrlRunSettings, {"irl": {name: 1.0}})
+
+
+DESIGN = (
+    "scale",
+    "results",
+    "figures",
+    "extensions",
+    "seeds",
+    "irl_seeds",
+    "cs_rewards",
+    "methods",
+    "single_target.",
+    "multi_target.",
+    "multi_task.",
+    "ablations.",
+)
+"""Keys that say what there is and where, not how it is made."""
+
+
+@pytest.mark.parametrize("name", [name for name, _, _ in keys(Settings()) if not name.startswith(DESIGN)])
+def test_every_key_of_the_study_reaches_a_run(name: str) -> None:
+    (value,) = (one for key, _, one in keys(Settings()) if key == name)
+    changed = validate(Settings, override({}, [f"{name}={json.dumps(_another(name, value))}"]))
+    assert any(_slices(changed, experiment) != _slices(Settings(), experiment) for experiment in EXPERIMENTS)
+
+
+def _slices(settings: Settings, experiment: str) -> list[BaseModel]:
+    """The settings of one run of every kind."""
+    tasks = ("push-back", "coffee-button")  # those that most keys make an exception for
+    agents: list[BaseModel] = [expert_run(settings, task, cs) for task in tasks for cs in settings.cs_rewards]
+    agents += [run(settings, task) for run in (baseline_run, transfer_run) for task in tasks]
+    learning = [irl_run(settings, experiment, [task], method) for task in tasks for method in settings.methods]
+    shown = [demonstration_run(settings, cs) for cs in settings.cs_rewards]
+    return [*agents, *learning, *shown, score_run(settings)]
+
+
+def _another(name: str, value: Any) -> Any:
+    """A value that is allowed and is another."""
+    known = {
+        "environment.observation": "raw",
+        "sac.learner": "stable_baselines3",
+        "sac.device": "cuda",
+        "irl.schedule": "as_printed",
+        "irl.curriculum_maximum": "task",
+        "irl.logit_temperature": "as_printed",
+        "irl.logit_density": "as_printed",
+        "irl.warm_up_temperature": "as_in_irl",
+        "irl.discriminator_update": "epoch",
+        "irl.generator_update": "epoch",
+        "sac.discount": 0.5,
+        "sac.min_log_std": -3.0,
+        "evaluation.episode_steps": 100,
+        "expert.held_until": 0.5,
+    }
+    if name in known:
+        return known[name]
+    if isinstance(value, Mapping):
+        return {key: _another("", one) for key, one in value.items()}
+    if isinstance(value, tuple):
+        return [3]
+    if isinstance(value, bool):
+        return not value
+    if isinstance(value, str):
+        return 0.3
+    return value * 2 if isinstance(value, int) and value else value / 2 if value else 1

@@ -1,12 +1,19 @@
 """Agents of a study in lockstep: what Snakemake would make, once, and shared between processes."""
 
+import dataclasses
+
 import pytest
 
+from mtcsirl.agents.finite import NotFiniteError
 from mtcsirl.episodes.policy import load_policy
+from mtcsirl.files.identity import FILE
 from mtcsirl.files.storage import locked, read_json
 from mtcsirl.settings.loading import load
+from mtcsirl.stages import together
+from mtcsirl.stages.agents import agent_task, train
+from mtcsirl.stages.collect_demonstrations import collect_demonstrations
+from mtcsirl.stages.learn_reward import Learning, learn_reward
 from mtcsirl.stages.together import job_of, train_together
-from mtcsirl.stages.training import collect_demonstrations, learn_reward
 from mtcsirl.study.design import design
 from mtcsirl.study.outputs import OUTPUTS
 
@@ -21,20 +28,19 @@ def test_an_agent_is_trained_once_its_reward_is_there(settings, tmp_path):
     transfer = next(run for run in study.transfers if run.irl.cs_reward == "velocity")
     lines: list[str] = []
     agents = len(study.experts) + len(study.baselines)
-    assert train_together(study, settings, tmp_path, log=lines.append) == agents, "no reward yet"
-    assert train_together(study, settings, tmp_path, log=lines.append) == 0, "what is there is not trained again"
+    assert train_together(study.agents, settings, tmp_path, log=lines.append) == agents, "no reward yet"
+    assert train_together(study.agents, settings, tmp_path, log=lines.append) == 0, "what is there is not trained again"
     (demonstrations,) = (run for run in study.demonstrations if run.cs_reward == "velocity")
     collect_demonstrations(
         demonstrations.settings(settings),
+        demonstrations,
         tmp_path / demonstrations.expert.folder,
-        demonstrations.task,
-        demonstrations.target,
-        "velocity",
         tmp_path / demonstrations.folder,
     )
     files = [tmp_path / demonstrations.folder / "demonstrations.parquet"]
-    learn_reward(transfer.irl.settings(settings), "mt_csirl", "velocity", files, 0, tmp_path / transfer.irl.folder)
-    assert train_together(study, settings, tmp_path, log=lines.append) == 1
+    learning = Learning("single_target", "mt_csirl", "velocity", transfer.irl.source, 0)
+    learn_reward(transfer.irl.settings(settings), learning, files, tmp_path / transfer.irl.folder)
+    assert train_together(study.agents, settings, tmp_path, log=lines.append) == 1
     assert any(line.startswith("transfer: ") for line in lines)
     for run in (*study.experts, *study.baselines, transfer):
         assert {name for name in OUTPUTS[run.stage] if (tmp_path / run.folder / name).is_file()} == set(
@@ -42,7 +48,7 @@ def test_an_agent_is_trained_once_its_reward_is_there(settings, tmp_path):
         )
         assert read_json(tmp_path / run.folder / "settings.json") == run.settings(settings).model_dump(mode="json")
         load_policy(tmp_path / run.folder)
-        assert not list((tmp_path / run.folder).glob("*together*")), "no checkpoint is left behind"
+        assert not list((tmp_path / run.folder).glob("*checkpoint*")), "no checkpoint is left behind"
     inputs = read_json(tmp_path / transfer.folder / "provenance.json")["inputs"]
     assert set(inputs) == {"reward.safetensors", "reward.json"}
 
@@ -53,6 +59,36 @@ def test_agents_that_another_process_holds_are_left_to_it(settings, tmp_path):
         assert train_together(runs[:2], settings, tmp_path, log=lambda line: None) == 1
     assert not (tmp_path / runs[0].folder / "gate.json").exists()
     assert (tmp_path / runs[1].folder / "gate.json").exists()
+
+
+def test_a_batch_leaves_what_single_jobs_leave(settings, tmp_path):
+    runs = [run for run in design(settings) if run.stage in ("train_sac", "train_expert")][:3]
+    assert train_together(runs, settings, tmp_path / "together", log=lambda line: None) == len(runs)
+    for run in runs:
+        job, about, inputs = job_of(run, settings, tmp_path)
+        train(job, agent_task(run.stage, about, job, tmp_path / "alone" / run.folder, None, inputs))
+        for name in (*OUTPUTS[run.stage], FILE):
+            if name != "provenance.json":
+                pair = [(tmp_path / side / run.folder / name).read_bytes() for side in ("together", "alone")]
+                assert pair[0] == pair[1], (run.folder, name)
+
+
+def test_an_agent_that_leaves_the_finite_numbers_takes_no_other_with_it(settings, tmp_path, monkeypatch):
+    runs = [run for run in design(settings) if run.stage == "train_sac"][:3]
+    original = together.job_of
+
+    def broken(run, *arguments):
+        job, *others = original(run, *arguments)
+        sac = job.settings.sac.model_copy(update={"reward_scale": 1e38})
+        bad = dataclasses.replace(job, settings=job.settings.model_copy(update={"sac": sac}))
+        return (bad if run == runs[1] else job), *others
+
+    monkeypatch.setattr(together, "job_of", broken)
+    lines: list[str] = []
+    with pytest.raises(NotFiniteError, match=runs[1].task):
+        train_together(runs, settings, tmp_path, log=lines.append)
+    assert [(tmp_path / run.folder / "gate.json").is_file() for run in runs] == [True, False, True]
+    assert not (tmp_path / runs[1].folder / "policy.safetensors").exists()
 
 
 def test_batches_hold_no_more_than_asked(settings, tmp_path):
@@ -66,15 +102,16 @@ def test_jobs_are_those_of_the_stages(tmp_path):
     settings = load()
     study = design(settings)
     baseline, expert = study.baselines[0], next(run for run in study.experts if run.task == "plate-slide")
-    assert (job_of(baseline, settings, tmp_path).gate, job_of(expert, settings, tmp_path).gate) == ("sac", "expert")
-    assert job_of(expert, settings, tmp_path).settings == expert.settings(settings)
-    assert job_of(expert, settings, tmp_path).settings.cs_weight == 40.0
+    (sac, _, _), (other, _, _) = job_of(baseline, settings, tmp_path), job_of(expert, settings, tmp_path)
+    assert (sac.gate, other.gate) == ("sac", "expert")
+    assert other.settings == expert.settings(settings)
+    assert other.settings.cs_weight == 40.0
 
 
 def test_variants_of_an_ablation_train_apart(settings, tmp_path):
     lines: list[str] = []
     study = design(settings, "ablation_observation")
-    assert train_together(study, settings, tmp_path, log=lines.append) == len(study.experts)
+    assert train_together(study.agents, settings, tmp_path, log=lines.append) == len(study.experts)
     batches = [line for line in lines if line.startswith("train_expert")]
     assert [line.count("/raw/") for line in batches] == [0, len(study.experts) // 2]
 

@@ -8,13 +8,13 @@ from mtcsirl.errors import UserError
 from mtcsirl.settings import Settings
 from mtcsirl.settings.loading import load
 from mtcsirl.study.ablations import ABLATIONS
-from mtcsirl.study.design import ARTEFACTS, FIGURE_TASKS, design, variants
-from mtcsirl.study.runs import Baseline, Demonstrations, Expert, IrlRun, Score, Study, Transfer
+from mtcsirl.study.design import ARTEFACTS, CLAIMS, FIGURE_TASKS, design, variants
+from mtcsirl.study.runs import KINDS, Baseline, Expert, Runs, read_folder
 
 SCALES = ("smoke", "desk", "paper")
 
 
-def everything(study: Study) -> set:
+def everything(study: Runs) -> set:
     return set(study)
 
 
@@ -28,26 +28,43 @@ def test_every_run_has_a_folder_of_its_own(settings: Settings) -> None:
     assert len(folders) == len(set(folders))
 
 
+def test_a_folder_gives_its_key_back(settings: Settings) -> None:
+    for run in design(settings):
+        kinds = {kind: key for kind in KINDS if (key := read_folder(kind.PATTERN, run.folder)) is not None}
+        assert kinds == {type(run): {name: str(value) for name, value in run.key.items() if name in kinds[type(run)]}}
+        assert read_folder(type(run).PATTERN, f"{run.folder}/more") is None
+
+
 def test_the_study_is_the_union_of_its_artefacts(settings: Settings) -> None:
-    union = set().union(*(everything(design(settings, name)) for name in ARTEFACTS))
-    assert everything(design(settings)) == union
+    union = set().union(*(everything(design(settings, name)) for name in (*ARTEFACTS, CLAIMS)))
+    assert everything(design(settings)) == union == everything(design(settings, CLAIMS))
+
+
+def test_claims_have_every_task_scored_and_the_generators_of_c12(settings: Settings) -> None:
+    whole = design(settings)
+    scored = {(run.irl.experiment, run.irl.cs_reward, run.task) for run in whole.scores}
+    for cs in settings.cs_rewards:
+        assert {task for kind, name, task in scored if (kind, name) == ("single_target", cs)} == set(
+            settings.single_target.tasks
+        )
+        assert {task for kind, name, task in scored if (kind, name) == ("multi_task", cs)} == set(
+            settings.multi_task.unseen_tasks
+        )
+    assert {run.variant for run in whole.irl_runs} == {"", "ablation_curriculum/constant"}
 
 
 def test_what_a_run_reads_is_in_the_study(settings: Settings) -> None:
     for name in ARTEFACTS:
         study = everything(design(settings, name))
         for run in study:
-            if isinstance(run, Transfer | Score):
-                assert run.irl in study
-            if isinstance(run, Score):
-                assert {run.expert, run.baseline} <= study
-            if isinstance(run, Demonstrations):
-                assert run.expert in study
-            if isinstance(run, IrlRun):
-                read = {
-                    (d.task, d.target) for d in study if isinstance(d, Demonstrations) and d.cs_reward == run.cs_reward
-                }
-                assert set(run.members) <= read
+            assert set(run.needs.values()) <= study
+
+
+def test_a_seed_imitates_the_expert_of_its_seed(settings: Settings) -> None:
+    """Several targets keep one expert per target, that of the first seed."""
+    for run in design(settings).irl_runs:
+        wanted = settings.seeds[0] if run.experiment == "multi_target" else run.seed
+        assert {one.expert.seed for one in run.demonstrations} == {wanted}
 
 
 def test_demonstrations_do_not_depend_on_the_artefact_asked_for(settings: Settings) -> None:
@@ -62,9 +79,9 @@ def test_table_2_counts() -> None:
     """Worked out by hand: 4 unseen tasks, 5 seeds, 2 cs-rewards, 5 methods, 6 train tasks with one target."""
     study = design(Settings(multi_task={"train_targets": [1]}), "table_2")
     assert study.jobs() == {
-        "train_expert": 4 * 2 * 5 + 6 * 2,
+        "train_expert": 4 * 2 * 5 + 6 * 2 * 5,
         "train_sac": 4 * 5,
-        "collect_demonstrations": 6 * 2,
+        "collect_demonstrations": 6 * 2 * 5,
         "learn_reward": 5 * 2 * 5,
         "transfer": 4 * 5 * 2 * 5,
     }
@@ -86,9 +103,9 @@ def test_table_1_counts() -> None:
 def test_single_target_figure_counts() -> None:
     study = design(Settings(), "figure_4")
     assert study.jobs() == {
-        "train_expert": 2,
+        "train_expert": 2 * 5,
         "train_sac": 5,
-        "collect_demonstrations": 2,
+        "collect_demonstrations": 2 * 5,
         "learn_reward": 2 * 5,
         "transfer": 2 * 5,
     }
@@ -105,7 +122,7 @@ def test_results_are_read_on_a_target_that_training_did_not_see() -> None:
         trained_on = {target for task, target in run.irl.members if task == run.task}
         if run.irl.experiment == "multi_target":
             assert run.target not in trained_on
-        if run.irl.experiment == "multi_task" and not run.learned_task_reward:
+        if run.irl.experiment == "multi_task" and run.task_reward == "known":
             assert not trained_on, "an unseen task"
         if run.irl.experiment == "single_target":
             assert run.target in trained_on
@@ -113,7 +130,7 @@ def test_results_are_read_on_a_target_that_training_did_not_see() -> None:
 
 def test_only_table_4_uses_the_learned_task_reward() -> None:
     study = design(Settings())
-    learned = {run for run in study.transfers if run.learned_task_reward}
+    learned = {run for run in study.transfers if run.task_reward == "learned"}
     assert learned == set(design(Settings(), "table_4").transfers)
 
 
@@ -150,9 +167,9 @@ def test_budgets_reach_the_runs() -> None:
     settings = Settings(
         expert={"steps": {"default": 7, "push-back": 9}}, demonstrations={"episodes": {"multi_task": 3}}
     )
-    assert Expert("velocity", "reach", 0, 0).settings(settings).steps == 7  # type: ignore[attr-defined]
-    assert Expert("velocity", "push-back", 0, 0).settings(settings).steps == 9  # type: ignore[attr-defined]
-    assert Baseline("push-back", 0, 0).settings(settings).cs_weight == 0  # type: ignore[attr-defined]
+    assert Expert("velocity", "reach", 0, 0).settings(settings).steps == 7
+    assert Expert("velocity", "push-back", 0, 0).settings(settings).steps == 9
+    assert Baseline("push-back", 0, 0).settings(settings).cs_weight == 0
 
 
 def test_shared_demonstrations_are_as_long_as_the_hungriest_reader_asks() -> None:
@@ -161,13 +178,9 @@ def test_shared_demonstrations_are_as_long_as_the_hungriest_reader_asks() -> Non
         multi_target={"tasks": ["coffee-button"], "train_targets": [1]},
         multi_task={"train_tasks": ["coffee-button", "reach"], "train_targets": [1]},
     )
-    episodes = {
-        (run.task, run.target): run.settings(settings).episodes  # type: ignore[attr-defined]
-        for run in design(settings).demonstrations
-    }
-    assert episodes["coffee-button", 1] == 5
-    assert episodes["coffee-button", 0] == 1
-    assert episodes["reach", 1] == 5
+    assert {run.settings(settings).episodes for run in design(settings).demonstrations} == {5}
+    read = {run.experiment: run.settings(settings).demonstration_episodes for run in design(settings).irl_runs}
+    assert read == {"single_target": 1, "multi_target": 2, "multi_task": 5}
 
 
 def test_unknown_artefact() -> None:
@@ -208,5 +221,6 @@ def test_a_variant_changes_the_settings_that_it_names_and_no_others() -> None:
     assert latest == default
 
 
-def test_ablations_are_no_part_of_the_study(settings: Settings) -> None:
-    assert not [run for run in design(settings) if run.folder.startswith("ablations/")]
+def test_ablations_are_no_part_of_the_study_but_for_what_a_claim_compares(settings: Settings) -> None:
+    own = {run.folder for run in design(settings) if run.folder.startswith("ablations/")}
+    assert all(folder.startswith("ablations/ablation_curriculum/constant/irl/") for folder in own)

@@ -18,7 +18,7 @@ from mtcsirl.validation.point_mass import (
     task_reward,
     uniform_transitions,
 )
-from mtcsirl.validation.study import DISCOUNT, UNSEEN, potentials
+from mtcsirl.validation.recovery import DISCOUNT, UNSEEN, potentials
 
 
 @pytest.fixture(scope="module")

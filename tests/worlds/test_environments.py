@@ -12,7 +12,7 @@ from metaworld.utils import reward_utils
 from scipy.spatial.transform import Rotation
 
 from mtcsirl.errors import UserError
-from mtcsirl.settings.study import DESIGN_TASKS
+from mtcsirl.names import DESIGN_TASKS
 from mtcsirl.worlds.environments import EPISODE_STEPS, OBSERVATION_MAPS, TaskEnvironment, make_environment
 from mtcsirl.worlds.fast.identity import first_difference, stock_environment, stock_task
 from mtcsirl.worlds.fast.rotation import quaternion_of

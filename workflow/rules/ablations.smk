@@ -6,12 +6,12 @@ for ablation in ABLATIONS:
         name:
             ablation
         input:
-            rows=rows_of(ablation),
-            code=code("ablations.py", "figures/ablation.py", "results/rows.py"),
+            shown_by(ablation),
         output:
             csv=f"<results>/ablations/{ablation}.csv",
             pdf=f"<figures>/{ablation}.pdf",
             png=f"<figures>/{ablation}.png",
+            made=page(ablation),
         log:
             f"<logs>/ablations/{ablation}.log",
         threads: 1
@@ -22,4 +22,4 @@ for ablation in ABLATIONS:
             figures=subpath(output.pdf, parent=True),
         shell:
             "mtcsirl ablation {params.name:q} --settings {params.settings:q} --output {params.folder:q}"
-            " --figures {params.figures:q} > {log:q} 2>&1"
+            " --figures {params.figures:q} >> {log:q} 2>&1"

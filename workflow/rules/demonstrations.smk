@@ -1,27 +1,22 @@
-"""Demonstrations: episodes of the stochastic expert of the study's first seed."""
-
-DEMONSTRATIONS = "demonstrations/{cs_reward}/{task}-t{target}"
+"""Demonstrations: episodes of a stochastic expert."""
 
 
 rule collect_demonstrations:
     """Episodes of the expert with the task reward, as Parquet."""
     input:
-        expert=needed_by(DEMONSTRATIONS, "expert", "policy.json", "policy.safetensors"),
-        code=code("collect_demonstrations"),
+        needed_by(Demonstrations),
     output:
-        **outputs("collect_demonstrations", DEMONSTRATIONS),
+        made(Demonstrations),
     log:
-        f"<logs>/{DEMONSTRATIONS}.log",
-    benchmark:
-        f"<benchmarks>/{DEMONSTRATIONS}.tsv"
+        log_of(Demonstrations),
     threads: 1
     resources:
         mem_mb=1200,
     params:
-        settings=settings_of(DEMONSTRATIONS),
-        expert=folder_of("expert"),
-        folder=subpath(output.demonstrations_parquet, parent=True),
+        settings=settings_of(Demonstrations),
+        expert=folders_of(Demonstrations, "expert"),
+        folder=subpath(output[0], parent=True),
     shell:
         "mtcsirl collect-demonstrations --expert {params.expert:q} --task {wildcards.task:q}"
-        " --target {wildcards.target:q} --cs-reward {wildcards.cs_reward:q}"
-        " --settings {params.settings:q} --output {params.folder:q} > {log:q} 2>&1"
+        " --target {wildcards.target:q} --cs-reward {wildcards.cs_reward:q} --seed {wildcards.seed:q}"
+        " --settings {params.settings:q} --output {params.folder:q} --identity {wildcards.identity:q} >> {log:q} 2>&1"

@@ -1,46 +1,36 @@
 """Agents on known rewards: experts (task and common-sense reward) and the plain SAC baseline."""
 
-EXPERT = "{variant}expert/{cs_reward}/{task}-t{target}/s{seed}"
-BASELINE = "sac/{task}-t{target}/s{seed}"
-
 
 rule train_expert:
     """SAC on the task reward and the weighted ground-truth common-sense reward."""
-    input:
-        code=code("train_expert"),
     output:
-        **outputs("train_expert", EXPERT),
+        made(Expert),
     log:
-        f"<logs>/{EXPERT}.log",
-    benchmark:
-        f"<benchmarks>/{EXPERT}.tsv"
+        log_of(Expert),
     threads: 1
     resources:
         mem_mb=1200,
     params:
-        settings=settings_of(EXPERT),
-        folder=subpath(output.gate_json, parent=True),
+        settings=settings_of(Expert),
+        folder=subpath(output[0], parent=True),
     shell:
         "mtcsirl train-expert --task {wildcards.task:q} --target {wildcards.target:q} --seed {wildcards.seed:q}"
-        " --cs-reward {wildcards.cs_reward:q} --settings {params.settings:q} --output {params.folder:q} > {log:q} 2>&1"
+        " --cs-reward {wildcards.cs_reward:q} --settings {params.settings:q} --output {params.folder:q}"
+        " --identity {wildcards.identity:q} >> {log:q} 2>&1"
 
 
 rule train_sac:
     """SAC on the task reward alone."""
-    input:
-        code=code("train_sac"),
     output:
-        **outputs("train_sac", BASELINE),
+        made(Baseline),
     log:
-        f"<logs>/{BASELINE}.log",
-    benchmark:
-        f"<benchmarks>/{BASELINE}.tsv"
+        log_of(Baseline),
     threads: 1
     resources:
         mem_mb=1200,
     params:
-        settings=settings_of(BASELINE),
-        folder=subpath(output.gate_json, parent=True),
+        settings=settings_of(Baseline),
+        folder=subpath(output[0], parent=True),
     shell:
         "mtcsirl train-sac --task {wildcards.task:q} --target {wildcards.target:q} --seed {wildcards.seed:q}"
-        " --settings {params.settings:q} --output {params.folder:q} > {log:q} 2>&1"
+        " --settings {params.settings:q} --output {params.folder:q} --identity {wildcards.identity:q} >> {log:q} 2>&1"

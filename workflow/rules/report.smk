@@ -4,25 +4,23 @@
 rule claims:
     """Verdict per claim, from the rows of every run."""
     input:
-        rows=rows_of(None),
-        published=PACKAGE / "results/published.yaml",
-        criteria=PACKAGE / "claims/claims.yaml",
-        code=code("claims"),
+        shown_by(CLAIMS),
     output:
         json="<results>/claims/claims.json",
         markdown=report(
             "<results>/claims/claims.md",
             caption="../report/claims.rst",
             category="Claims",
-            labels={"claims": "C1 to C12", "form": "every number"},
+            labels={"claims": "C1 to C13", "form": "every number"},
         ),
         pdf="<results>/claims/claims.pdf",
         png=report(
             "<results>/claims/claims.png",
             caption="../report/claims.rst",
             category="Claims",
-            labels={"claims": "C1 to C12", "form": "one page"},
+            labels={"claims": "C1 to C13", "form": "one page"},
         ),
+        made=page(CLAIMS),
     log:
         "<logs>/claims.log",
     threads: 1
@@ -30,31 +28,26 @@ rule claims:
         settings=as_json(SETTINGS),
         folder=subpath(output.json, parent=True),
     shell:
-        "mtcsirl claims --settings {params.settings:q} --output {params.folder:q} > {log:q} 2>&1"
+        "mtcsirl claims --settings {params.settings:q} --output {params.folder:q} >> {log:q} 2>&1"
 
 
 rule report:
     """One page that opens in a browser: what was run, verdicts, tables, figures, gates, deviations."""
     input:
-        tables=expand("<results>/tables/{table}.{ending}", table=TABLES, ending=["csv", "md", "tex"]),
-        heat_maps=expand("<results>/tables/{table}.png", table=HEAT_MAPS),
-        figures=expand("<figures>/{figure}.{ending}", figure=FIGURES, ending=["pdf", "png"]),
-        claims=rules.claims.output,
-        provenance=[path for run in STUDY for path in files(run, "provenance.json")],
-        page=multiext(str(PACKAGE / "report/page"), ".html", ".css"),
-        code=code("report"),
+        [ancient(page(name)) for name in (*ARTEFACTS, CLAIMS)],
     output:
-        report(
+        page=report(
             "<results>/report/index.html",
             caption="../report/start.rst",
             category="Start page",
             labels={"page": "everything, to be read from the top"},
         ),
+        made=page("report"),
     log:
         "<logs>/report.log",
     threads: 1
     params:
         settings=as_json(SETTINGS),
-        folder=subpath(output[0], parent=True),
+        folder=subpath(output.page, parent=True),
     shell:
-        "mtcsirl report --settings {params.settings:q} --output {params.folder:q} > {log:q} 2>&1"
+        "mtcsirl report --settings {params.settings:q} --output {params.folder:q} >> {log:q} 2>&1"

@@ -1,7 +1,6 @@
-"""The paper's tables: targets table_1 ... table_5, each as CSV, Markdown and LaTeX."""
+"""The paper's tables: targets table_1 ... table_5, each as CSV, JSON, Markdown and LaTeX."""
 
 TABLES = [name for name in ARTEFACTS if name.startswith("table_")]
-HEAT_MAPS = ["table_1", "table_3"]  # drawn beside the paper's as well
 
 
 def title(artefact):
@@ -29,11 +28,10 @@ for table in TABLES:
         name:
             table
         input:
-            rows=rows_of(table),
-            published=PACKAGE / "results/published.yaml",
-            code=code(f"tables/{table}.py", "results/rows.py", *["figures/heat_maps.py"][: table in HEAT_MAPS]),
+            shown_by(table),
         output:
             csv=f"<results>/tables/{table}.csv",
+            json=f"<results>/tables/{table}.json",
             markdown=report(
                 f"<results>/tables/{table}.md",
                 caption=f"../report/{table}.rst",
@@ -42,6 +40,7 @@ for table in TABLES:
             ),
             latex=f"<results>/tables/{table}.tex",
             heat_map=heat_map(table),
+            made=page(table),
         log:
             f"<logs>/tables/{table}.log",
         threads: 1
@@ -50,4 +49,4 @@ for table in TABLES:
             settings=as_json(SETTINGS),
             folder=subpath(output.csv, parent=True),
         shell:
-            "mtcsirl table {params.number:q} --settings {params.settings:q} --output {params.folder:q} > {log:q} 2>&1"
+            "mtcsirl table {params.number:q} --settings {params.settings:q} --output {params.folder:q} >> {log:q} 2>&1"

@@ -3,21 +3,20 @@
 
 rule validation:
     """MT-CSIRL and its controls where the truth is known."""
-    input:
-        code=code("validation/study.py", "validation/figure.py", "irl/methods/mt_csirl.py"),
     output:
         correlations="<results>/validation/correlations.csv",
         agents="<results>/validation/agents.csv",
         curve="<results>/validation/curve.csv",
         pdf="<figures>/validation.pdf",
         png="<figures>/validation.png",
+        made=page("validation"),
     log:
         "<logs>/validation.log",
-    benchmark:
-        "<benchmarks>/validation.tsv"
     threads: 2
     params:
         folder=subpath(output.curve, parent=True),
         figures=subpath(output.pdf, parent=True),
+        results=SETTINGS.results,
     shell:
-        "mtcsirl validate --output {params.folder:q} --figures {params.figures:q} --processes {threads} > {log:q} 2>&1"
+        "mtcsirl validate --output {params.folder:q} --figures {params.figures:q} --results {params.results:q}"
+        " --processes {threads} >> {log:q} 2>&1"

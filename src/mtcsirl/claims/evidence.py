@@ -8,15 +8,12 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from mtcsirl.names import EVALUATION_TARGET, LAST, distance_metric
 from mtcsirl.results.published import Published
-from mtcsirl.results.rows import KEY, MISSING, OK, select
+from mtcsirl.results.rows import KEY, MISSING, OK, STALE, select
 from mtcsirl.results.statistics import Summary, probability_of_improvement, summarise
 from mtcsirl.rewards.ground_truth import COMMON_SENSE_REWARDS
 from mtcsirl.settings import Settings
-from mtcsirl.study.runs import EVALUATION_TARGET
-
-LAST = "last"
-"""In the column ``kept`` of rows: an agent's last policy, where another was kept."""
 
 
 @dataclass(frozen=True)
@@ -71,7 +68,7 @@ class Group:
     @cached_property
     def step_distance(self) -> Summary:
         """E|m - tau| of single steps over seeds: no oscillation about the target hides in it. n = 0 if not recorded."""
-        return summarise(per_seed(self.values(f"{self.cs_reward}_distance")))
+        return summarise(per_seed(self.values(distance_metric(self.cs_reward))))
 
 
 def per_seed(values: pd.DataFrame) -> pd.Series:
@@ -178,7 +175,7 @@ class Evidence:
         }
         for name in needs:
             judged = select(self._agents, **keys[name])
-            judged = judged[judged["status"] != MISSING]
+            judged = judged[~judged["status"].isin([MISSING, STALE])]
             passed = (judged["status"] == OK).groupby([judged["task"], judged["target"], judged["seed"]]).all()
             if passed.sum() < int(share * len(passed) + 0.5):
                 return f"{passed.sum()} of {len(passed)} {name} passed their gate"

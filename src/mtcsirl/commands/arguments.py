@@ -1,19 +1,24 @@
 """Arguments that several verbs share, and how settings come from them."""
 
 import argparse
-import json
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
 from pydantic import BaseModel
 
 from mtcsirl.errors import UserError
-from mtcsirl.names import TARGETS_PER_TASK, TASKS
+from mtcsirl.files.storage import check_writable
+from mtcsirl.names import HIGHEST_SEED, HIGHEST_TARGET_SEED, TARGETS_PER_TASK, TASKS
 from mtcsirl.settings import Settings
-from mtcsirl.settings.loading import load, override, read_yaml, validate
+from mtcsirl.settings.loading import configured, load, override, read_yaml, validate
+from mtcsirl.settings.machine import check_agent, check_irl
+from mtcsirl.settings.runs import AgentRunSettings, IrlRunSettings
+from mtcsirl.settings.strict import StrictError, parse_json
+from mtcsirl.settings.unread import refuse, unread
 from mtcsirl.study.ablations import ABLATIONS
 from mtcsirl.study.design import ARTEFACTS
+from mtcsirl.study.outputs import OUTPUTS
 
 Model = TypeVar("Model", bound=BaseModel)
 Verbs = Any
@@ -30,14 +35,14 @@ def add_verb(
         formatter_class=argparse.RawDescriptionHelpFormatter,
         description=f"{does[0].upper()}{does[1:]}.\n\nneeds:  {needs}\nwrites: {writes}",
     )
-    verb.set_defaults(run=run)
+    verb.set_defaults(run=run, verb=name, only_prints=writes == "nothing")
     return verb
 
 
 def add_run_settings(verb: argparse.ArgumentParser) -> None:
     """``--settings``, ``--config``, ``--set`` of a verb that does one job."""
     verb.add_argument(
-        "--settings", metavar="JSON|FILE", help="settings of this one run; default: from the configuration"
+        "--settings", type=text, metavar="JSON|FILE", help="settings of this one run; default: from the configuration"
     )
     add_config(verb)
     verb.add_argument(
@@ -51,7 +56,9 @@ def add_run_settings(verb: argparse.ArgumentParser) -> None:
 
 def add_study_settings(verb: argparse.ArgumentParser) -> None:
     """``--settings``, ``--config``, ``--set`` of a verb that reads the whole study."""
-    verb.add_argument("--settings", metavar="JSON|FILE", help="the whole configuration; default: config/config.yaml")
+    verb.add_argument(
+        "--settings", type=text, metavar="JSON|FILE", help="the whole configuration; default: config/config.yaml"
+    )
     add_config(verb)
     verb.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="one key; may be repeated")
 
@@ -65,7 +72,12 @@ def add_config(verb: argparse.ArgumentParser) -> None:
     """``--config`` and ``--scale``."""
     verb.add_argument("--scale", choices=("smoke", "desk", "paper"), help="overlay config/SCALE.yaml; default: desk")
     verb.add_argument(
-        "--config", action="append", default=[], metavar="FILE", help="overlay on config/config.yaml; may be repeated"
+        "--config",
+        action="append",
+        type=text,
+        default=[],
+        metavar="FILE",
+        help="overlay on config/config.yaml; may be repeated",
     )
 
 
@@ -74,7 +86,7 @@ def add_agent(verb: argparse.ArgumentParser, *, cs_reward: bool = True) -> None:
     add_task(verb)
     if cs_reward:
         add_cs_reward(verb)
-    verb.add_argument("--seed", required=True, type=natural, help="seed of every random number of the run")
+    verb.add_argument("--seed", required=True, type=seed, help="seed of every random number of the run")
 
 
 def add_task(verb: argparse.ArgumentParser) -> None:
@@ -95,7 +107,16 @@ def add_cs_reward(verb: argparse.ArgumentParser) -> None:
 def add_output(verb: argparse.ArgumentParser, default: str | None = None) -> None:
     """``--output``."""
     verb.add_argument(
-        "--output", required=default is None, default=default, type=Path, metavar="DIR", help="folder to write to"
+        "--output", required=default is None, default=default, type=new_folder, metavar="DIR", help="folder to write to"
+    )
+
+
+def add_identity(verb: argparse.ArgumentParser) -> None:
+    """``--identity`` of a verb that a workflow calls."""
+    verb.add_argument(
+        "--identity",
+        metavar="HASH",
+        help="what a workflow planned for; a run that would be another is refused",
     )
 
 
@@ -120,11 +141,59 @@ def target(text: str) -> int:
     return int(text)
 
 
+def new_folder(text: str) -> Path:
+    """A folder that can be written, or made."""
+    return _writable(text, folder=True)
+
+
+def new_file(text: str) -> Path:
+    """A file that can be written."""
+    return _writable(text, folder=False)
+
+
+def _writable(text: str, *, folder: bool) -> Path:
+    place = path(text)
+    check_writable(place, folder=folder)
+    return place
+
+
 def natural(text: str) -> int:
     """A whole number from 0."""
-    if not text.isdecimal():
-        raise argparse.ArgumentTypeError(f"{text!r}: must be a whole number from 0")
+    return _whole(text, 0, None)
+
+
+def positive(text: str) -> int:
+    """A whole number from 1."""
+    return _whole(text, 1, None)
+
+
+def seed(text: str) -> int:
+    """The seed of a run."""
+    return _whole(text, 0, HIGHEST_SEED)
+
+
+def target_seed(text: str) -> int:
+    """The seed of Meta-World's targets."""
+    return _whole(text, 0, HIGHEST_TARGET_SEED)
+
+
+def _whole(text: str, least: int, most: int | None) -> int:
+    if not text.isdecimal() or len(text) > 19 or int(text) < least or (most is not None and int(text) > most):
+        upper = "" if most is None else f" to {most}"
+        raise argparse.ArgumentTypeError(f"{text[:40]!r}: must be a whole number from {least}{upper}")
     return int(text)
+
+
+def text(given: str) -> str:
+    """Something: an empty text, as an unset variable of a shell leaves it, stands for no default."""
+    if not given.strip():
+        raise argparse.ArgumentTypeError("must not be empty; leave the option out for its default")
+    return given
+
+
+def path(given: str) -> Path:
+    """A path that is not empty: that would be the working folder."""
+    return Path(text(given))
 
 
 def cs_reward(name: str) -> str:
@@ -136,7 +205,7 @@ def cs_reward(name: str) -> str:
 
 def method(name: str) -> str:
     """A registered IRL method."""
-    from mtcsirl.irl.methods import METHODS
+    from mtcsirl.extensions import METHODS
 
     return _registered(name, METHODS, "method")
 
@@ -147,19 +216,50 @@ def _registered(name: str, registry: Any, what: str) -> str:
     return name
 
 
-def run_settings(parsed: argparse.Namespace, model: type[Model], from_study: Callable[[Settings], Model]) -> Model:
-    """The settings of one run: ``--settings``, else what the configuration says; then ``--set``."""
+def run_settings(
+    parsed: argparse.Namespace, model: type[Model], from_study: Callable[[Settings], Model], stage: str = ""
+) -> Model:
+    """The settings of one run: ``--settings``, else what the configuration says; then ``--set``.
+
+    With ``stage`` the run itself is looked at before it starts: that it reads every key that was set, that this machine
+    can do it, that ``--output`` holds no other kind of run.
+    """
     if parsed.settings:
         data = _mapping(parsed.settings)
     else:
         data = from_study(load(parsed.config, scale=parsed.scale)).model_dump(mode="json")
-    return validate(model, override(data, parsed.set))
+    settings = validate(model, override(data, parsed.set))
+    if stage:
+        key = {name: getattr(parsed, name, "") for name in ("cs_reward", "method")}
+        refuse(settings, unread(stage, **key), key["method"] or stage.replace("_", "-"))
+        refuse_folder_of_others(parsed.output, stage)
+    if stage and isinstance(settings, AgentRunSettings):
+        check_agent(settings)
+    if stage and isinstance(settings, IrlRunSettings):
+        check_irl(settings, len(parsed.demonstrations))
+    return settings
+
+
+def refuse_folder_of_others(folder: Path, stage: str = "") -> None:
+    """Raise UserError where ``folder`` holds files of a run that ``stage`` would not leave (no stage: any run's)."""
+    own = {*OUTPUTS.get(stage, ("evaluation.csv",)), "settings.json", "provenance.json"}
+    others = {name for names in OUTPUTS.values() for name in names} - (own if stage else {"evaluation.csv"})
+    found = sorted(name for name in others if (folder / name).exists())
+    if found:
+        raise UserError(f"{folder}: holds another run ({found[0]}); choose a folder of its own")
+
+
+def check_experiment(asked: str | None, found: str, members: Sequence[tuple[str, int]]) -> None:
+    """Raise UserError where the experiment ``asked`` for is not what the tasks and targets of the run make it."""
+    if asked not in (None, found):
+        names = ", ".join(f"{task}-t{target}" for task, target in members)
+        raise UserError(f"--experiment {asked}: the demonstrations are of {names}, which is {found}")
 
 
 def study_settings(parsed: argparse.Namespace) -> Settings:
     """The whole configuration: ``--settings``, else ``config/config.yaml`` with its overlays; then ``--set``."""
     if parsed.settings:
-        return validate(Settings, override(_mapping(parsed.settings), parsed.set))
+        return configured(override(_mapping(parsed.settings), parsed.set))
     return load(parsed.config, parsed.set, parsed.scale)
 
 
@@ -168,7 +268,7 @@ def _mapping(text: str) -> dict[str, Any]:
     if not text.lstrip().startswith("{"):
         return read_yaml(text)
     try:
-        data: dict[str, Any] = json.loads(text)
-    except json.JSONDecodeError as error:
-        raise UserError(f"--settings: not valid JSON ({error})") from error
+        data: dict[str, Any] = parse_json(text)
+    except StrictError as error:
+        raise UserError(f"--settings: {error}") from error
     return data

@@ -4,21 +4,22 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
-from mtcsirl.commands.arguments import Verbs, add_study_settings, add_verb, study_settings
+from mtcsirl.commands.arguments import Verbs, add_study_settings, add_verb, new_folder, study_settings
 from mtcsirl.commands.drawing import write_figure
+from mtcsirl.commands.remedy import Verb, advised
 from mtcsirl.settings import Settings
 from mtcsirl.study.ablations import ABLATIONS
-from mtcsirl.study.design import ARTEFACTS, design
-from mtcsirl.study.runs import Run
+from mtcsirl.study.artefacts import HEAT_MAPS, sign_artefact, unsign_artefact
+from mtcsirl.study.design import ARTEFACTS, CLAIMS, design
+from mtcsirl.study.runs import IrlRun, Score
+from mtcsirl.study.standing import DONE, standing
 
 if TYPE_CHECKING:
     import pandas as pd
 
     from mtcsirl.claims.claims import Finding
 
-AnyRun = TypeVar("AnyRun", bound=Run)
-HEAT_MAPS = {"table_1": "action_norm", "table_3": "velocity"}
-"""Tables that are also drawn, beside the paper's, and their cs-reward."""
+Kind = TypeVar("Kind", IrlRun, Score)
 
 
 def register(verbs: Verbs) -> None:
@@ -28,7 +29,7 @@ def register(verbs: Verbs) -> None:
         "table",
         _table,
         does="make one of the paper's tables",
-        writes="table_N.csv, .md, .tex (1, 3: .pdf, .png)",
+        writes="table_N.csv, .json, .md, .tex (1, 3: .pdf, .png)",
         numbered=True,
     )
     _add(verbs, "figure", _figure, does="draw one of the paper's figures", writes="figure_N.pdf, .png", numbered=True)
@@ -36,7 +37,7 @@ def register(verbs: Verbs) -> None:
         verbs, "ablation", _ablation, does="draw an ablation", writes="NAME.csv; NAME.pdf, .png into --figures"
     )
     ablation.add_argument("name", choices=tuple(ABLATIONS), metavar="NAME", help=", ".join(ABLATIONS))
-    ablation.add_argument("--figures", type=Path, metavar="DIR", help="default: where the DAG puts it")
+    ablation.add_argument("--figures", type=new_folder, metavar="DIR", help="default: where the DAG puts it")
     _add(
         verbs,
         "reward-quality",
@@ -57,12 +58,12 @@ def register(verbs: Verbs) -> None:
 
 
 def _add(
-    verbs: Verbs, name: str, run: object, *, does: str, writes: str, numbered: bool = False
+    verbs: Verbs, name: str, run: Verb, *, does: str, writes: str, numbered: bool = False
 ) -> argparse.ArgumentParser:
     verb = add_verb(
         verbs,
         name,
-        run,  # type: ignore[arg-type]
+        advised(run, _target),
         does=does,
         needs="the study's runs in its results folder; with --partial those that are there",
         writes=f"{writes} into --output",
@@ -72,21 +73,30 @@ def _add(
         verb.add_argument("number", choices=numbers, metavar="N", help=f"as in the paper: {', '.join(numbers)}")
     verb.add_argument("--partial", action="store_true", help="read what is there and mark what is missing")
     add_study_settings(verb)
-    verb.add_argument("--output", type=Path, metavar="DIR", help="default: where the DAG puts it")
+    verb.add_argument("--output", type=new_folder, metavar="DIR", help="default: where the DAG puts it")
     return verb
 
 
+def _target(parsed: argparse.Namespace) -> str:
+    """What Snakemake calls what this verb makes."""
+    if "number" in parsed:
+        return f"{parsed.verb}_{parsed.number}"
+    return str(parsed.name) if "name" in parsed else {"results": "all"}.get(parsed.verb, parsed.verb.replace("-", "_"))
+
+
 def _table(parsed: argparse.Namespace) -> None:
-    from mtcsirl.files.storage import write_csv, write_text
+    from mtcsirl.files.storage import write_csv, write_json, write_text
     from mtcsirl.results.rows import evaluation_rows
     from mtcsirl.tables import TABLES
 
     settings = study_settings(parsed)
     name = f"table_{parsed.number}"
-    rows = evaluation_rows(design(settings, name), settings.results, partial=parsed.partial)
+    rows = evaluation_rows(design(settings, name), settings, partial=parsed.partial)
     table = TABLES[name](rows, settings)
-    folder = parsed.output or Path(settings.results) / "tables"
+    home = Path(settings.results) / "tables"
+    folder = parsed.output or home
     write_csv(folder / f"{name}.csv", table.csv())
+    write_json(folder / f"{name}.json", table.as_json())
     write_text(folder / f"{name}.md", table.markdown())
     write_text(folder / f"{name}.tex", table.latex())
     if name in HEAT_MAPS:
@@ -94,6 +104,7 @@ def _table(parsed: argparse.Namespace) -> None:
 
         cs_reward = HEAT_MAPS[name]
         write_figure(folder / name, heat_map(cs_reward, rows, settings), heat_map_caption(cs_reward, settings))
+    _sign(parsed, settings, name, home, folder)
     print(table.markdown())
 
 
@@ -106,39 +117,56 @@ def _figure(parsed: argparse.Namespace) -> None:
     name = f"figure_{parsed.number}"
     study = design(settings, name)
     readers = {"curves": curve_rows, "scores": score_rows, "points": point_rows}
-    frames = {what: read(study, settings.results, partial=parsed.partial) for what, read in readers.items()}
+    frames = {what: read(study, settings, partial=parsed.partial) for what, read in readers.items()}
     spec = figure_spec(name)
     data = FigureData(settings=settings, **frames)
     figure, caption = spec.draw(data), spec.caption(data)
-    write_figure((parsed.output or Path(settings.figures)) / name, figure, caption)
+    home = Path(settings.figures)
+    folder = parsed.output or home
+    write_figure(folder / name, figure, caption)
+    _sign(parsed, settings, name, home, folder)
     print(f"{spec.title}. {caption}")
 
 
+def _sign(parsed: argparse.Namespace, settings: Settings, name: str, home: Path, folder: Path) -> None:
+    """Note what the files ``name``.* in ``folder`` were made from, where the DAG looks for them."""
+    if folder.resolve() != home.resolve():
+        return
+    if parsed.partial:
+        unsign_artefact(name, settings)
+    else:
+        sign_artefact(name, settings, sorted(folder.glob(f"{name}.*")))
+
+
 def _reward_quality(parsed: argparse.Namespace) -> None:
-    from mtcsirl.figures.style import scale_notes
+    from mtcsirl.results.notes import scale_notes
     from mtcsirl.results.reward_quality import quality_markdown, read_quality
 
     settings = study_settings(parsed)
-    runs = _there(design(settings).scores, settings, "points.parquet", parsed.partial)
+    runs = _there(design(settings).scores, settings, parsed.partial)
     rows = read_quality(runs, settings.results, settings.score.bootstrap)
     text = quality_markdown(rows, " ".join(scale_notes(settings.scale)))
-    _write_summary((parsed.output or Path(settings.results) / "scores") / "reward_quality", rows, text)
+    home = Path(settings.results) / "scores"
+    _write_summary((parsed.output or home) / "reward_quality", rows, text)
+    _sign(parsed, settings, "reward_quality", home, parsed.output or home)
 
 
 def _diagnostics(parsed: argparse.Namespace) -> None:
-    from mtcsirl.figures.style import scale_notes
     from mtcsirl.results.diagnosis import diagnoses_markdown, read_diagnoses
+    from mtcsirl.results.notes import scale_notes
 
     settings = study_settings(parsed)
-    runs = _there(design(settings).irl_runs, settings, "gate.json", parsed.partial)
+    runs = _there(design(settings).irl_runs, settings, parsed.partial)
     rows = read_diagnoses(runs, settings.results)
     text = diagnoses_markdown(rows, scale_notes(settings.scale))
-    _write_summary((parsed.output or Path(settings.results) / "diagnostics") / "diagnostics", rows, text)
+    home = Path(settings.results) / "diagnostics"
+    _write_summary((parsed.output or home) / "diagnostics", rows, text)
+    _sign(parsed, settings, "diagnostics", home, parsed.output or home)
 
 
-def _there(runs: tuple[AnyRun, ...], settings: Settings, name: str, partial: bool) -> tuple[AnyRun, ...]:
-    """All ``runs``; if ``partial``, those that have left their file ``name``."""
-    return tuple(run for run in runs if not partial or (Path(settings.results) / run.folder / name).is_file())
+def _there(runs: tuple[Kind, ...], settings: Settings, partial: bool) -> tuple[Kind, ...]:
+    """All ``runs``; if ``partial``, those that are done."""
+    return tuple(run for run in runs if not partial or standing(run, settings).state == DONE)
 
 
 def _write_summary(path: Path, rows: "pd.DataFrame", text: str) -> None:
@@ -158,11 +186,13 @@ def _ablation(parsed: argparse.Namespace) -> None:
 
     settings, name = study_settings(parsed), parsed.name
     shown = variants(settings, name)
-    frames = {v: evaluation_rows(study, settings.results, partial=parsed.partial) for v, study in shown.items()}
+    frames = {v: evaluation_rows(study, settings, partial=parsed.partial) for v, study in shown.items()}
     rows = variant_rows(frames)
-    write_csv((parsed.output or Path(settings.results) / "ablations") / f"{name}.csv", rows)
+    home, figures = Path(settings.results) / "ablations", parsed.figures or Path(settings.figures)
+    write_csv((parsed.output or home) / f"{name}.csv", rows)
     text = caption(name, rows, settings)
-    write_figure((parsed.figures or Path(settings.figures)) / name, draw(name, rows, settings), text)
+    write_figure(figures / name, draw(name, rows, settings), text)
+    _sign(parsed, settings, name, home, parsed.output or home)
     print(text)
 
 
@@ -173,11 +203,13 @@ def _claims(parsed: argparse.Namespace) -> None:
 
     settings = study_settings(parsed)
     findings = _judged(settings, parsed.partial)
-    folder = parsed.output or Path(settings.results) / "claims"
+    home = Path(settings.results) / "claims"
+    folder = parsed.output or home
     text = claims_markdown(findings, settings)
     write_json(folder / "claims.json", claims_json(findings, settings))
     write_text(folder / "claims.md", text)
     write_figure(folder / "claims", claims_figure(findings, settings), caption())
+    _sign(parsed, settings, "claims", home, folder)
     print(text)
 
 
@@ -185,15 +217,13 @@ def _judged(settings: Settings, partial: bool) -> "list[Finding]":
     import pandas as pd
 
     from mtcsirl.claims.claims import judge
-    from mtcsirl.results.rows import ablated_generators, evaluation_rows, point_rows, score_rows
-    from mtcsirl.study.design import variants
+    from mtcsirl.results.rows import evaluation_rows, last_rows, point_rows, score_rows
 
-    study, name = design(settings), "ablation_curriculum"
-    rows = evaluation_rows(study, settings.results, partial=partial)
-    without = ablated_generators(variants(settings, name)["constant"], settings.results, name)
-    scores = score_rows(study, settings.results, partial=partial)
-    points = point_rows(study, settings.results, partial=partial)
-    return judge(pd.concat([rows, without], ignore_index=True), scores, settings, points=points)
+    runs = design(settings, CLAIMS)
+    rows, last, scores, points = (
+        read(runs, settings, partial=partial) for read in (evaluation_rows, last_rows, score_rows, point_rows)
+    )
+    return judge(pd.concat([rows, last], ignore_index=True), scores, settings, points=points)
 
 
 def _results(parsed: argparse.Namespace) -> None:
@@ -204,7 +234,7 @@ def _results(parsed: argparse.Namespace) -> None:
     from mtcsirl.tables import TABLES
 
     settings = study_settings(parsed)
-    rows = {name: evaluation_rows(design(settings, name), settings.results, partial=parsed.partial) for name in TABLES}
+    rows = {name: evaluation_rows(design(settings, name), settings, partial=parsed.partial) for name in TABLES}
     tables = {name: table(rows[name], settings) for name, table in TABLES.items()}
     made = {"commit": commit(), **machine()}
     page = (parsed.output or Path("docs")) / "results.md"
@@ -218,6 +248,9 @@ def _report(parsed: argparse.Namespace) -> None:
     from mtcsirl.report.page import build_report
 
     settings = study_settings(parsed)
-    page = (parsed.output or Path(settings.results) / "report") / "index.html"
+    home = Path(settings.results) / "report"
+    page = (parsed.output or home) / "index.html"
     write_text(page, build_report(collect(settings, page, partial=parsed.partial)))
+    if not parsed.partial and page.parent.resolve() == home.resolve():
+        sign_artefact("report", settings, [page])
     print(page)

@@ -1,9 +1,8 @@
 """The verb that draws what one IRL run logged; `mtcsirl diagnostics` lists all of a study."""
 
 import argparse
-from pathlib import Path
 
-from mtcsirl.commands.arguments import Verbs, add_study_settings, add_verb, study_settings
+from mtcsirl.commands.arguments import Verbs, add_study_settings, add_verb, new_file, path, study_settings
 from mtcsirl.commands.drawing import write_figure
 
 
@@ -17,8 +16,8 @@ def register(verbs: Verbs) -> None:
         needs="the folder of an IRL run",
         writes="the file --output as PNG and PDF",
     )
-    drawing.add_argument("--run", required=True, type=Path, metavar="DIR", dest="folder", help="folder of the IRL run")
-    drawing.add_argument("--output", required=True, type=Path, metavar="FILE", help="for example s0.png")
+    drawing.add_argument("--run", required=True, type=path, metavar="DIR", dest="folder", help="folder of the IRL run")
+    drawing.add_argument("--output", required=True, type=new_file, metavar="FILE", help="for example s0.png")
     add_study_settings(drawing)
 
 

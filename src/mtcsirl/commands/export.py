@@ -1,9 +1,8 @@
 """The verbs that hand results to other tools: SB3 zip, Minari dataset."""
 
 import argparse
-from pathlib import Path
 
-from mtcsirl.commands.arguments import Verbs, add_verb
+from mtcsirl.commands.arguments import Verbs, add_verb, new_file, new_folder, path
 
 
 def register(verbs: Verbs) -> None:
@@ -16,8 +15,8 @@ def register(verbs: Verbs) -> None:
         needs="the folder of a trained agent",
         writes="--output; it holds pickled objects, which this package itself never reads",
     )
-    policy.add_argument("--policy", required=True, type=Path, metavar="DIR", help="folder of the agent")
-    policy.add_argument("--output", required=True, type=Path, metavar="FILE.zip", help="file to write")
+    policy.add_argument("--policy", required=True, type=path, metavar="DIR", help="folder of the agent")
+    policy.add_argument("--output", required=True, type=new_file, metavar="FILE.zip", help="file to write")
 
     demonstrations = add_verb(
         verbs,
@@ -27,9 +26,11 @@ def register(verbs: Verbs) -> None:
         needs="demonstrations.parquet; Minari: pip install 'mtcsirl[export]'",
         writes="a dataset below --output, which MINARI_DATASETS_PATH must name to load it",
     )
-    demonstrations.add_argument("--demonstrations", required=True, type=Path, metavar="FILE", help="Parquet file")
+    demonstrations.add_argument("--demonstrations", required=True, type=path, metavar="FILE", help="Parquet file")
     demonstrations.add_argument("--name", metavar="ID", help="Minari's id; default: mtcsirl/TASK-tTARGET-v0")
-    demonstrations.add_argument("--output", required=True, type=Path, metavar="DIR", help="folder of Minari datasets")
+    demonstrations.add_argument(
+        "--output", required=True, type=new_folder, metavar="DIR", help="folder of Minari datasets"
+    )
 
 
 def _export_policy(parsed: argparse.Namespace) -> None:

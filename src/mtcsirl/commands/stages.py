@@ -1,21 +1,26 @@
 """The verbs that train, learn and measure: one per stage of the DAG, and ``evaluate``."""
 
 import argparse
+from functools import partial
 from pathlib import Path
 
 from mtcsirl.commands.arguments import (
     Verbs,
     add_agent,
     add_cs_reward,
+    add_identity,
     add_output,
     add_run_settings,
-    add_task,
     add_verb,
+    check_experiment,
     method,
-    natural,
+    path,
+    refuse_folder_of_others,
     run_settings,
+    seed,
 )
 from mtcsirl.errors import UserError
+from mtcsirl.names import EXPERIMENTS
 
 AGENT_FILES = "policy.safetensors/.json, curve.csv, evaluation.csv, gate.json, settings.json, provenance.json"
 
@@ -34,11 +39,13 @@ def register(verbs: Verbs) -> None:
 def _train_expert(verbs: Verbs) -> None:
     def run(parsed: argparse.Namespace) -> None:
         from mtcsirl.settings.runs import AgentRunSettings, expert_run
-        from mtcsirl.stages import training as stages
+        from mtcsirl.stages.train_expert import train_expert
+        from mtcsirl.study.runs import Expert
 
-        settings = run_settings(parsed, AgentRunSettings, lambda s: expert_run(s, parsed.task, parsed.cs_reward))
-        job = stages.expert_job(settings, parsed.task, parsed.target, parsed.cs_reward, parsed.seed)
-        stages.train(job, parsed.output)
+        of_task = partial(expert_run, task=parsed.task, cs_reward=parsed.cs_reward)
+        settings = run_settings(parsed, AgentRunSettings, of_task, "train_expert")
+        expert = Expert(parsed.cs_reward, parsed.task, parsed.target, parsed.seed)
+        train_expert(settings, expert, parsed.output, wanted=parsed.identity)
 
     verb = add_verb(
         verbs,
@@ -51,15 +58,17 @@ def _train_expert(verbs: Verbs) -> None:
     add_agent(verb)
     add_run_settings(verb)
     add_output(verb)
+    add_identity(verb)
 
 
 def _train_sac(verbs: Verbs) -> None:
     def run(parsed: argparse.Namespace) -> None:
         from mtcsirl.settings.runs import AgentRunSettings, baseline_run
-        from mtcsirl.stages import training as stages
+        from mtcsirl.stages.train_sac import train_sac
+        from mtcsirl.study.runs import Baseline
 
-        settings = run_settings(parsed, AgentRunSettings, lambda s: baseline_run(s, parsed.task))
-        stages.train(stages.sac_job(settings, parsed.task, parsed.target, parsed.seed), parsed.output)
+        settings = run_settings(parsed, AgentRunSettings, lambda s: baseline_run(s, parsed.task), "train_sac")
+        train_sac(settings, Baseline(parsed.task, parsed.target, parsed.seed), parsed.output, wanted=parsed.identity)
 
     verb = add_verb(
         verbs,
@@ -72,17 +81,19 @@ def _train_sac(verbs: Verbs) -> None:
     add_agent(verb, cs_reward=False)
     add_run_settings(verb)
     add_output(verb)
+    add_identity(verb)
 
 
 def _collect_demonstrations(verbs: Verbs) -> None:
     def run(parsed: argparse.Namespace) -> None:
         from mtcsirl.settings.runs import DemonstrationRunSettings, demonstration_run
-        from mtcsirl.stages import training as stages
+        from mtcsirl.stages.collect_demonstrations import collect_demonstrations
+        from mtcsirl.study.runs import Demonstrations, Expert
 
-        settings = run_settings(parsed, DemonstrationRunSettings, demonstration_run)
-        stages.collect_demonstrations(
-            settings, parsed.expert, parsed.task, parsed.target, parsed.cs_reward, parsed.output
-        )
+        of_expert = partial(demonstration_run, cs_reward=parsed.cs_reward)
+        settings = run_settings(parsed, DemonstrationRunSettings, of_expert, "collect_demonstrations")
+        shown = Demonstrations(Expert(parsed.cs_reward, parsed.task, parsed.target, parsed.seed))
+        collect_demonstrations(settings, shown, parsed.expert, parsed.output, wanted=parsed.identity)
 
     verb = add_verb(
         verbs,
@@ -93,26 +104,26 @@ def _collect_demonstrations(verbs: Verbs) -> None:
         writes="demonstrations.parquet, gate.json, settings.json, provenance.json into --output",
     )
     verb.add_argument("--expert", required=True, type=_folder, metavar="DIR", help="folder of the expert")
-    add_task(verb)
-    add_cs_reward(verb)
+    add_agent(verb)
     add_run_settings(verb)
     add_output(verb)
+    add_identity(verb)
 
 
 def _learn_reward(verbs: Verbs) -> None:
     def run(parsed: argparse.Namespace) -> None:
-        from mtcsirl.episodes.demonstrations import task_of
+        from mtcsirl.episodes.demonstrations import member_of
         from mtcsirl.settings.runs import IrlRunSettings, irl_run
-        from mtcsirl.stages import training as stages
+        from mtcsirl.stages.learn_reward import Learning, experiment_of, learn_reward
 
-        files = parsed.demonstrations
-        experiment = "multi_task" if len(files) > 1 else "single_target"
-        settings = run_settings(
-            parsed, IrlRunSettings, lambda s: irl_run(s, experiment, [task_of(file) for file in files])
-        )
-        stages.learn_reward(
-            settings, parsed.method, parsed.cs_reward, parsed.demonstrations, parsed.seed, parsed.output
-        )
+        members = [member_of(file) for file in parsed.demonstrations]
+        experiment, source = experiment_of(members)
+        check_experiment(parsed.experiment, experiment, members)
+        tasks = {task for task, _ in members}
+        of_members = partial(irl_run, experiment=experiment, tasks=tasks, method=parsed.method)
+        settings = run_settings(parsed, IrlRunSettings, of_members, "learn_reward")
+        learning = Learning(experiment, parsed.method, parsed.cs_reward, source, parsed.seed)
+        learn_reward(settings, learning, parsed.demonstrations, parsed.output, wanted=parsed.identity)
 
     verb = add_verb(
         verbs,
@@ -125,28 +136,24 @@ def _learn_reward(verbs: Verbs) -> None:
     )
     verb.add_argument("--method", required=True, type=method, metavar="NAME", help="mt_csirl, mt_airl, ...")
     add_cs_reward(verb)
-    verb.add_argument("--seed", required=True, type=natural, help="seed of every random number of the run")
-    verb.add_argument("--demonstrations", required=True, nargs="+", type=Path, metavar="FILE", help="Parquet files")
+    verb.add_argument("--seed", required=True, type=seed, help="seed of every random number of the run")
+    verb.add_argument("--demonstrations", required=True, nargs="+", type=path, metavar="FILE", help="Parquet files")
+    verb.add_argument(
+        "--experiment", choices=EXPERIMENTS, help="default: what the tasks and targets of the demonstrations make it"
+    )
     add_run_settings(verb)
     add_output(verb)
+    add_identity(verb)
 
 
 def _transfer(verbs: Verbs) -> None:
     def run(parsed: argparse.Namespace) -> None:
         from mtcsirl.settings.runs import AgentRunSettings, transfer_run
-        from mtcsirl.stages import training as stages
+        from mtcsirl.stages.transfer import NewAgent, transfer
 
-        settings = run_settings(parsed, AgentRunSettings, lambda s: transfer_run(s, parsed.task))
-        job = stages.transfer_job(
-            settings,
-            parsed.reward,
-            parsed.task,
-            parsed.target,
-            parsed.cs_reward,
-            parsed.seed,
-            learned_task_reward=parsed.task_reward == "learned",
-        )
-        stages.train(job, parsed.output)
+        settings = run_settings(parsed, AgentRunSettings, lambda s: transfer_run(s, parsed.task), "transfer")
+        agent = NewAgent(parsed.cs_reward, parsed.task, parsed.target, parsed.seed, parsed.task_reward)
+        transfer(settings, parsed.reward, agent, parsed.output, wanted=parsed.identity)
 
     verb = add_verb(
         verbs,
@@ -166,39 +173,35 @@ def _transfer(verbs: Verbs) -> None:
     add_agent(verb)
     add_run_settings(verb)
     add_output(verb)
+    add_identity(verb)
 
 
 def _score_reward(verbs: Verbs) -> None:
     def run(parsed: argparse.Namespace) -> None:
         from mtcsirl.settings.runs import ScoreRunSettings, score_run
-        from mtcsirl.stages import training as stages
+        from mtcsirl.stages.score_reward import Scoring, score_reward
 
-        settings = run_settings(parsed, ScoreRunSettings, score_run)
-        stages.score_reward(
-            settings,
-            parsed.reward,
-            parsed.expert,
-            parsed.baseline,
-            parsed.task,
-            parsed.target,
-            parsed.cs_reward,
-            parsed.seed,
-            parsed.output,
-        )
+        settings = run_settings(parsed, ScoreRunSettings, score_run, "score_reward")
+        scoring = Scoring(parsed.cs_reward, parsed.task, parsed.target, parsed.seed)
+        policies = parsed.expert, parsed.baseline
+        score_reward(settings, scoring, parsed.reward, *policies, parsed.output, wanted=parsed.identity)
 
     verb = add_verb(
         verbs,
         "score-reward",
         run,
         does="correlate a learned reward with the ground truth on named transition sets, beside controls",
-        needs="the folders of a learned reward, of an expert and of a SAC baseline of the task",
+        needs="the folders of a learned reward, of experts and of SAC baselines of the task",
         writes="scores.csv, points.parquet, settings.json, provenance.json into --output",
     )
-    for name, what in (("reward", "the learned reward"), ("expert", "an expert"), ("baseline", "a SAC baseline")):
-        verb.add_argument(f"--{name}", required=True, type=_folder, metavar="DIR", help=f"folder of {what}")
+    verb.add_argument("--reward", required=True, type=_folder, metavar="DIR", help="folder of the learned reward")
+    for name, what in (("expert", "experts"), ("baseline", "SAC baselines")):
+        does = f"folders of the {what} of the task, one per seed"
+        verb.add_argument(f"--{name}", required=True, nargs="+", type=_folder, metavar="DIR", help=does)
     add_agent(verb)
     add_run_settings(verb)
     add_output(verb)
+    add_identity(verb)
 
 
 def _evaluate(verbs: Verbs) -> None:
@@ -210,6 +213,7 @@ def _evaluate(verbs: Verbs) -> None:
         from mtcsirl.files.storage import write_csv
         from mtcsirl.settings.runs import AgentRunSettings, baseline_run
 
+        refuse_folder_of_others(parsed.output)
         settings = run_settings(parsed, AgentRunSettings, lambda s: baseline_run(s, parsed.task))
         policy = load_policy(parsed.policy)
         rows = evaluate(policy, parsed.task, parsed.target, parsed.cs_reward, parsed.seed, settings)
@@ -233,6 +237,7 @@ def _evaluate(verbs: Verbs) -> None:
 
 
 def _folder(text: str) -> Path:
-    if not Path(text).is_dir():
+    folder = path(text)
+    if not folder.is_dir():
         raise UserError(f"{text}: no such folder; run the stage that makes it first")
-    return Path(text)
+    return folder

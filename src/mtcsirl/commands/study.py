@@ -6,7 +6,17 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from mtcsirl.commands.arguments import Verbs, add_artefact, add_study_settings, add_verb, study_settings
+from mtcsirl.commands.arguments import (
+    Verbs,
+    add_artefact,
+    add_study_settings,
+    add_verb,
+    new_file,
+    path,
+    positive,
+    study_settings,
+)
+from mtcsirl.errors import UserError
 from mtcsirl.study.ablations import ABLATIONS
 from mtcsirl.study.design import ARTEFACTS, design
 
@@ -26,8 +36,8 @@ def register(verbs: Verbs) -> None:
         writes="nothing",
     )
     add_artefact(plan)
-    plan.add_argument("--rates", type=Path, default=None, metavar="FILE", help="what calibrate wrote; default: shipped")
-    plan.add_argument("--cores", type=int, default=2, metavar="N", help="cores to spread the jobs over; default 2")
+    plan.add_argument("--rates", type=path, default=None, metavar="FILE", help="what calibrate wrote; default: shipped")
+    plan.add_argument("--cores", type=positive, default=2, metavar="N", help="cores to spread the jobs over; default 2")
     add_study_settings(plan)
 
     status = add_verb(
@@ -39,8 +49,18 @@ def register(verbs: Verbs) -> None:
         writes="nothing",
     )
     add_artefact(status)
-    status.add_argument("--cores", type=int, default=2, metavar="N", help="cores for the time left; default 2")
+    status.add_argument("--cores", type=positive, default=2, metavar="N", help="cores for the time left; default 2")
     add_study_settings(status)
+
+    check = add_verb(
+        verbs,
+        "verify",
+        _verify,
+        does="check that every file of a results folder is what its run wrote, and say what to delete",
+        needs="a results folder",
+        writes="nothing",
+    )
+    check.add_argument("folder", type=Path, metavar="FOLDER", help="for example results")
 
     differences = add_verb(
         verbs,
@@ -71,10 +91,11 @@ def register(verbs: Verbs) -> None:
         needs="a machine that has nothing else to do",
         writes="the file that plan reads, --output",
     )
-    calibrate.add_argument("--output", type=Path, required=True, metavar="FILE", help="a JSON file")
+    calibrate.add_argument("--output", type=rates_to_write, required=True, metavar="FILE", help="a JSON file")
 
 
 def _plan(parsed: argparse.Namespace) -> None:
+    from mtcsirl.settings.template import fallbacks
     from mtcsirl.study.plan import CALIBRATION, load_rates, plan, wall_hours
 
     settings, rates = study_settings(parsed), load_rates(parsed.rates or CALIBRATION)
@@ -88,6 +109,8 @@ def _plan(parsed: argparse.Namespace) -> None:
     _print_table(("stage", "jobs", "core-hours", "longest job, min", "memory, MiB", "disk, GiB"), lines)
     print(f"\nscale {settings.scale}: {wall_hours(stages, parsed.cores):.1f} hours on {parsed.cores} cores")
     print(f"rates measured on: {rates.machine}")
+    for note in fallbacks(settings):
+        print(note)
     if parsed.target is None:
         _print_artefacts(settings, rates)
 
@@ -106,7 +129,7 @@ def _print_artefacts(settings: "Settings", rates: "Rates") -> None:
 
 def _status(parsed: argparse.Namespace) -> None:
     from mtcsirl.study.plan import load_rates
-    from mtcsirl.study.status import FAILED, RUNNING, STATES, seconds_left, study_status
+    from mtcsirl.study.status import FAILED, RUNNING, STALE, STATES, seconds_left, study_status
 
     settings = study_settings(parsed)
     statuses = study_status(design(settings, parsed.target), settings)
@@ -117,12 +140,24 @@ def _status(parsed: argparse.Namespace) -> None:
         counts = [sum(status.state == state for status in own) for state in STATES]
         lines.append((stage, *counts, f"{sum(gates)} of {len(gates)}" if gates else ""))
     _print_table(("stage", *STATES, "gates passed"), lines)
-    for state in (RUNNING, FAILED):
+    for state in (STALE, RUNNING, FAILED):
         for status in statuses:
             if status.state == state:
                 print(f"{state}: {status.run.folder}: {status.says}")
     left = seconds_left(statuses, settings, load_rates(), parsed.cores)
     print(f"\ntime left on {parsed.cores} cores: about {left / 3600:.1f} hours" if left else "\nall runs are done")
+
+
+def _verify(parsed: argparse.Namespace) -> None:
+    from mtcsirl.errors import UserError
+    from mtcsirl.study.verification import faults
+
+    found = list(faults(parsed.folder))
+    for fault in found:
+        print(f"delete {fault.path}: {fault.why}")
+    if found:
+        raise UserError(f"{parsed.folder}: {len(found)} faults; delete what is listed and make it again")
+    print(f"{parsed.folder}: every file is what its run wrote")
 
 
 def _print_table(head: tuple[str, ...], rows: Sequence[tuple[object, ...]]) -> None:
@@ -145,7 +180,8 @@ def _deviations(parsed: argparse.Namespace) -> None:
 
 
 def _settings(parsed: argparse.Namespace) -> None:
-    from mtcsirl.settings.template import schema, template
+    from mtcsirl.settings.machine import check_study
+    from mtcsirl.settings.template import fallbacks, schema, template
 
     if parsed.form == "defaults":
         print(template(), end="")
@@ -158,7 +194,23 @@ def _settings(parsed: argparse.Namespace) -> None:
     elif parsed.form == "schema":
         print(json.dumps(schema(), indent=2))
     else:
+        check_study(settings)
         print(f"valid: scale {settings.scale}")
+        for note in fallbacks(settings):
+            print(note)
+
+
+def rates_to_write(given: str) -> Path:
+    """A file for rates: a new one, or one that holds rates already."""
+    from mtcsirl.study.plan import load_rates
+
+    file = new_file(given)
+    if file.exists():
+        try:
+            load_rates(file)
+        except UserError as error:
+            raise UserError(f"{file}: is there and holds no rates; choose another name") from error
+    return file
 
 
 def _calibrate(parsed: argparse.Namespace) -> None:

@@ -3,7 +3,17 @@
 import argparse
 from pathlib import Path
 
-from mtcsirl.commands.arguments import Verbs, add_artefact, add_study_settings, add_verb, natural, study_settings
+from mtcsirl.commands.arguments import (
+    Verbs,
+    add_artefact,
+    add_study_settings,
+    add_verb,
+    natural,
+    positive,
+    study_settings,
+)
+from mtcsirl.files.storage import check_writable
+from mtcsirl.settings.machine import check_study
 
 AGENT_STAGES = ("train_sac", "train_expert", "transfer")
 
@@ -20,7 +30,8 @@ def register(verbs: Verbs) -> None:
     )
     add_artefact(verb)
     verb.add_argument("--stages", nargs="+", choices=AGENT_STAGES, default=AGENT_STAGES, help="default: all three")
-    verb.add_argument("--most", type=natural, default=16, metavar="N", help="agents in one batch; default 16")
+    verb.add_argument("--most", type=positive, default=16, metavar="N", help="agents in one batch; default 16")
+    verb.add_argument("--workers", type=natural, default=0, metavar="N", help="processes that step environments")
     add_study_settings(verb)
 
 
@@ -29,6 +40,8 @@ def _run(parsed: argparse.Namespace) -> None:
     from mtcsirl.study.design import design
 
     settings = study_settings(parsed)
-    runs = [run for run in design(settings, parsed.target) if run.stage in parsed.stages]
-    trained = train_together(runs, settings, Path(settings.results), most=max(1, parsed.most))
+    check_study(settings)
+    check_writable(settings.results, folder=True)
+    runs = [run for run in design(settings, parsed.target).agents if run.stage in parsed.stages]
+    trained = train_together(runs, settings, Path(settings.results), most=parsed.most, workers=parsed.workers)
     print(f"{trained} agents trained")

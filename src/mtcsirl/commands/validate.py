@@ -1,9 +1,8 @@
 """The verb that checks MT-CSIRL where the truth is known."""
 
 import argparse
-from pathlib import Path
 
-from mtcsirl.commands.arguments import Verbs, add_output, add_verb, natural
+from mtcsirl.commands.arguments import Verbs, add_output, add_verb, new_folder, path, positive
 from mtcsirl.commands.drawing import write_figure
 
 
@@ -18,18 +17,26 @@ def register(verbs: Verbs) -> None:
         writes="correlations.csv, agents.csv, curve.csv into --output; validation.pdf, .png into --figures",
     )
     add_output(verb, "results/validation")
-    verb.add_argument("--figures", type=Path, default=Path("paper_figs"), metavar="DIR", help="folder of the figure")
-    verb.add_argument("--processes", type=natural, default=1, help="seeds that run at the same time")
+    verb.add_argument("--figures", type=new_folder, default="paper_figs", metavar="DIR", help="folder of the figure")
+    verb.add_argument("--results", type=path, metavar="DIR", help="results folder where to note what was made")
+    verb.add_argument("--processes", type=positive, default=1, help="seeds that run at the same time")
 
 
 def _validate(parsed: argparse.Namespace) -> None:
     from mtcsirl.files.storage import write_csv
     from mtcsirl.validation.figure import caption, draw
-    from mtcsirl.validation.study import ValidationSettings, validate
+    from mtcsirl.validation.recovery import ValidationSettings, recover
 
-    findings = validate(ValidationSettings(), processes=parsed.processes)
+    findings = recover(ValidationSettings(), processes=parsed.processes)
     for name, frame in findings._asdict().items():
         write_csv(parsed.output / f"{name}.csv", frame)
     figure, text = draw(findings), caption(findings)
     write_figure(parsed.figures / "validation", figure, text)
+    if parsed.results is not None:
+        from mtcsirl.settings import Settings
+        from mtcsirl.study.artefacts import sign_artefact
+
+        drawn = [parsed.figures / f"validation.{ending}" for ending in ("pdf", "png")]
+        made = [parsed.output / f"{name}.csv" for name in findings._asdict()] + drawn
+        sign_artefact("validation", Settings(results=str(parsed.results)), made)
     print(text)

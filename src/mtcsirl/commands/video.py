@@ -3,8 +3,10 @@
 import argparse
 from pathlib import Path
 
-from mtcsirl.commands.arguments import Verbs, add_verb, natural, target, task
+from mtcsirl.commands.arguments import Verbs, add_verb, new_file, path, positive, seed, target, target_seed, task
 from mtcsirl.errors import UserError
+
+EDGES = (64, 1024)
 
 
 def register(verbs: Verbs) -> None:
@@ -18,16 +20,16 @@ def register(verbs: Verbs) -> None:
         "libosmesa6; imageio-ffmpeg for MP4",
         writes="the file --output, a GIF or MP4",
     )
-    verb.add_argument("folders", nargs="+", type=Path, metavar="FOLDER", help="run folder of an expert, SAC, ...")
-    verb.add_argument("--output", required=True, type=Path, metavar="FILE", help="ends in .gif or .mp4")
+    verb.add_argument("folders", nargs="+", type=path, metavar="FOLDER", help="run folder of an expert, SAC, ...")
+    verb.add_argument("--output", required=True, type=film, metavar="FILE", help="ends in .gif or .mp4")
     verb.add_argument("--label", action="append", default=[], metavar="TEXT", help="one per folder, in their order")
     verb.add_argument("--task", type=task, metavar="TASK", help="another task than the one that was trained on")
     verb.add_argument("--target", type=target, metavar="INDEX", help="another target than the one that was trained on")
-    verb.add_argument("--steps", type=natural, default=500, help="environment steps, at most 500")
-    verb.add_argument("--seed", type=natural, default=0, help="draws the actions of the stochastic policies")
+    verb.add_argument("--steps", type=positive, default=500, help="environment steps, at most 500")
+    verb.add_argument("--seed", type=seed, default=0, help="draws the actions of the stochastic policies")
     verb.add_argument("--deterministic", action="store_true", help="show the modes of the policies instead")
-    verb.add_argument("--size", type=natural, default=320, help="edge of a panel in pixels")
-    verb.add_argument("--target-seed", type=natural, default=0, help="seed of Meta-World's targets")
+    verb.add_argument("--size", type=_edge, default=320, help=f"edge of a panel in pixels, {EDGES[0]} to {EDGES[1]}")
+    verb.add_argument("--target-seed", type=target_seed, default=0, help="seed of Meta-World's targets")
 
 
 def _video(parsed: argparse.Namespace) -> None:
@@ -43,3 +45,18 @@ def _video(parsed: argparse.Namespace) -> None:
     seed = None if parsed.deterministic else parsed.seed
     render_video(clips, parsed.output, steps=parsed.steps, seed=seed, size=parsed.size, target_seed=parsed.target_seed)
     print(parsed.output)
+
+
+def film(given: str) -> Path:
+    """The file of a video."""
+    file = new_file(given)
+    if file.suffix.lower() not in (".gif", ".mp4"):
+        raise UserError(f"{file}: videos end in .gif or .mp4")
+    return file
+
+
+def _edge(given: str) -> int:
+    pixels = positive(given)
+    if not EDGES[0] <= pixels <= EDGES[1]:
+        raise argparse.ArgumentTypeError(f"{given!r}: must be {EDGES[0]} to {EDGES[1]}")
+    return pixels

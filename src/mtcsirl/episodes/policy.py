@@ -61,6 +61,22 @@ class Policy:
         return np.tanh(mean)
 
 
+def finite_action(
+    policy: Policy, observation: np.ndarray, generator: np.random.Generator | None, where: str
+) -> np.ndarray:
+    """The policy's action [4], which ``where`` (whose policy, which step) names if it is no number.
+
+    MuJoCo resets itself when it is given NaN, and the arm falls: a policy of NaN would close a drawer.
+
+    Raises:
+        UserError: an entry of the action is not finite.
+    """
+    action = policy.act(observation, generator)
+    if not np.isfinite(action).all():
+        raise UserError(f"{where}: the action {action.tolist()} is not finite; train the agent again")
+    return action
+
+
 def save_policy(policy: Policy, folder: Path | str, name: str = "policy") -> None:
     """Write `<name>.safetensors` (weights) and `<name>.json` (shapes, bounds, observation) into `folder`."""
     folder = Path(folder)
@@ -80,7 +96,7 @@ def save_policy(policy: Policy, folder: Path | str, name: str = "policy") -> Non
 def load_policy(folder: Path | str, name: str = "policy") -> Policy:
     """Read a policy that `save_policy` wrote.
 
-    Raises UserError when a file is missing, damaged or of another kind.
+    Raises UserError when a file is missing, damaged, of another kind or holds a number that is not finite.
     """
     description_file, tensor_file = (Path(folder) / f"{name}{end}" for end in (".json", ".safetensors"))
     sizes, bounds, observation = _description(description_file)
@@ -91,6 +107,9 @@ def load_policy(folder: Path | str, name: str = "policy") -> Policy:
     found = {key: tuple(tensor.shape) for key, tensor in tensors.items()}
     if found != expected or any(tensor.dtype != torch.float32 for tensor in tensors.values()):
         raise UserError(f"{tensor_file}: its tensors do not fit {description_file.name}; train the agent again")
+    broken = sorted(key for key, tensor in tensors.items() if not torch.isfinite(tensor).all())
+    if broken:
+        raise UserError(f"{tensor_file}: {', '.join(broken)} hold numbers that are not finite; train the agent again")
     layers = range(len(sizes) - 1)
     weights = tuple(tensors[f"weight_{layer}"].numpy() for layer in layers)
     biases = tuple(tensors[f"bias_{layer}"].numpy() for layer in layers)
@@ -105,6 +124,8 @@ def _description(file: Path) -> tuple[list[int], tuple[float, float], str]:
     try:
         sizes = [int(size) for size in said["sizes"]]
         bounds = float(said["min_log_std"]), float(said["max_log_std"])
+        if not np.isfinite(bounds).all():
+            raise ValueError(f"bounds {bounds} of log_std")
         OBSERVATION_MAPS[said["observation"]]
     except (KeyError, TypeError, ValueError) as error:
         raise UserError(f"{file}: does not describe a policy ({error}); train the agent again") from error

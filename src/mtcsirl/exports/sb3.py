@@ -23,8 +23,11 @@ def export_sb3(folder: Path | str, file: Path | str, name: str = "policy") -> No
     `policy.json` is affine and goes into the first layer, so the model acts on Meta-World's own observations. Such a
     zip contains pickled objects; this package writes it for others and never reads one.
 
-    Raises UserError for a policy whose log_std bounds stable-baselines3 does not have.
+    Raises UserError for a file that does not end in .zip, for stable-baselines3 would add that, and for a policy whose
+    log_std bounds stable-baselines3 does not have.
     """
+    if Path(file).suffix != ".zip":
+        raise UserError(f"{file}: must end in .zip")
     from stable_baselines3 import SAC
 
     from mtcsirl.agents.reference import Spaces

@@ -6,8 +6,8 @@ from typing import Any
 
 import pandas as pd
 
+from mtcsirl.names import CS_REWARDS
 from mtcsirl.settings import Settings
-from mtcsirl.settings.study import CS_REWARDS
 
 CURVE_COLUMNS = (
     "stage", "experiment", "method", "cs_reward", "source", "task", "target", "seed", "step", "metric", "value",

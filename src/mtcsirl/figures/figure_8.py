@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from mtcsirl.figures.data import FigureData
 from mtcsirl.figures.style import INK, NOTE_COLOUR, TEXT_WIDTH, new_figure, scale_notes, styled
+from mtcsirl.names import EVALUATION_TARGET
 from mtcsirl.settings import Settings
-from mtcsirl.study.runs import EVALUATION_TARGET
 from mtcsirl.worlds.rendering import Image, camera_pose
 
 TITLE = "Train and test tasks of the three experiments"

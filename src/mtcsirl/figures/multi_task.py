@@ -4,8 +4,8 @@ from mtcsirl.figures.curves import Series
 from mtcsirl.figures.data import FigureData, rows_where
 from mtcsirl.figures.scatter import Correlation, select_correlation
 from mtcsirl.figures.style import LOOKS
+from mtcsirl.names import EVALUATION_TARGET
 from mtcsirl.study.design import design
-from mtcsirl.study.runs import EVALUATION_TARGET
 
 EXPERIMENT, METHOD, SOURCE = "multi_task", "mt_csirl", "all"
 

@@ -14,9 +14,12 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from mtcsirl.names import AGENTS, QUANTITIES, Quantity, agent_label
+from mtcsirl.results.notes import scale_notes as scale_notes  # every drawing says it
+from mtcsirl.rewards.ground_truth import COMMON_SENSE_REWARDS
+
 TEXT_WIDTH = 5.5
 """Width of the paper's text in inches; figures are drawn at the size at which they are printed."""
-SMOKE_NOTE = "smoke scale: numbers mean nothing"
 NO_RUNS, NOT_ASKED = "no runs yet", "not part of this study"
 """Why a panel is empty."""
 TARGET_COLOUR = "#C00000"
@@ -39,46 +42,44 @@ COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#2
 """For series that are no methods, in their order: Okabe-Ito and two more."""
 
 LOOKS: dict[str, Look] = {
-    "expert": Look("Expert", "#009E73", (0, (5, 1.5)), "s"),
-    "sac": Look("SAC", "#E69F00", (0, (1, 1.2)), "^"),
-    "irl_agent": Look("IRL agent", "#56B4E9", (0, (4, 1, 1, 1)), "D"),
-    "mt_airl": Look("MT-AIRL", "#CC79A7", (0, (3, 1)), "v"),
-    "mt_vairl": Look("MT-VAIRL", "#8C6D31", (0, (3, 1, 1, 1)), "<"),
-    "mt_vairl_gp": Look("MT-VAIRL-GP", "#7F7F7F", (0, (3, 1, 1, 1, 1, 1)), ">"),
-    "mt_csirl": Look("MT-CSIRL", "#0072B2", "-", "o"),
-    "mt_csirl_lt": Look("MT-CSIRL+LT", "#222222", (0, (8, 2)), "P"),
+    "expert": Look(AGENTS["expert"], "#009E73", (0, (5, 1.5)), "s"),
+    "sac": Look(AGENTS["sac"], "#E69F00", (0, (1, 1.2)), "^"),
+    "irl_agent": Look(AGENTS["irl_agent"], "#56B4E9", (0, (4, 1, 1, 1)), "D"),
+    "mt_airl": Look(AGENTS["mt_airl"], "#CC79A7", (0, (3, 1)), "v"),
+    "mt_vairl": Look(AGENTS["mt_vairl"], "#8C6D31", (0, (3, 1, 1, 1)), "<"),
+    "mt_vairl_gp": Look(AGENTS["mt_vairl_gp"], "#7F7F7F", (0, (3, 1, 1, 1, 1, 1)), ">"),
+    "mt_csirl": Look(AGENTS["mt_csirl"], "#0072B2", "-", "o"),
+    "mt_csirl_lt": Look(AGENTS["mt_csirl_lt"], "#222222", (0, (8, 2)), "P"),
 }
 """Okabe-Ito colours; a method that is not listed is drawn by :func:`look` in grey under its own name."""
-
-_QUANTITIES = {
-    "velocity": ("velocity", "m/s"),
-    "action_norm": ("action norm", "$\\Vert a\\Vert_1$"),
-    "success": ("success rate", "share of episodes"),
-    "task_reward": ("task reward", "per step"),
-}
-"""Name and, for an axis, unit; the action norm has none, so its formula stands there."""
 
 
 def look(method: str) -> Look:
     """The look of ``method``; one that the suite does not ship gets grey, so it still shows."""
-    return LOOKS.get(method, Look(method.replace("_", "-").upper(), "#555555", (0, (2, 1)), "X"))
+    return LOOKS.get(method, Look(agent_label(method), "#555555", (0, (2, 1)), "X"))
 
 
 def quantity(metric: str) -> str:
     """Name of a metric in words, as in ``velocity``."""
-    return _QUANTITIES.get(metric, (metric.replace("_", " "), ""))[0]
+    return _quantity(metric).label
 
 
 def quantity_label(metric: str) -> str:
     """Axis label of a metric with its unit, as in ``velocity (m/s)``."""
-    name, unit = _QUANTITIES.get(metric, (metric.replace("_", " "), ""))
+    name, unit, _ = _quantity(metric)
     return f"{name} ({unit})" if unit else name
+
+
+def _quantity(metric: str) -> Quantity:
+    """A metric of the suite; a cs-reward of one's own with the unit of its registry entry; else its bare name."""
+    if metric in QUANTITIES:
+        return QUANTITIES[metric]
+    own = COMMON_SENSE_REWARDS.get(metric)
+    return Quantity(metric.replace("_", " "), own.unit if own else "")
 
 
 def target_of(cs_reward: str) -> float:
     """The value that the ground-truth cs-reward aims at, in its unit."""
-    from mtcsirl.rewards.ground_truth import COMMON_SENSE_REWARDS
-
     return COMMON_SENSE_REWARDS[cs_reward].target
 
 
@@ -134,11 +135,6 @@ def add_notes(figure: Figure, notes: Sequence[str]) -> None:
     if notes:
         figure.set_figheight(figure.get_figheight() + 0.14 * len(notes))
         figure.supxlabel("\n".join(notes), fontsize=6.5, color=NOTE_COLOUR)
-
-
-def scale_notes(scale: str) -> list[str]:
-    """The line that every smoke artefact carries."""
-    return [SMOKE_NOTE] if scale == "smoke" else []
 
 
 def step_axis(axes: Axes) -> None:

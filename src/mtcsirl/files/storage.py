@@ -5,16 +5,19 @@ full disk leaves the old file or none, never half of one. Every reader turns a m
 one :class:`~mtcsirl.errors.UserError` that names it.
 """
 
-import fcntl
 import hashlib
 import json
 import os
+import tempfile
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
 from mtcsirl.errors import UserError
+from mtcsirl.files.identity import verify
+from mtcsirl.files.lock import is_locked as is_locked
+from mtcsirl.files.lock import locked as locked
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -23,25 +26,34 @@ if TYPE_CHECKING:
 
 @contextmanager
 def atomic(path: Path | str, mode: str = "w") -> Iterator[IO[Any]]:
-    """Open a temporary neighbour of ``path`` and rename it to ``path`` when the block ends without an error."""
+    """Open a temporary neighbour of ``path`` and rename it to ``path`` when the block ends without an error.
+
+    Raises OSError that names ``path`` when it cannot be written, for example on a full disk.
+    """
     path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
     temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+    text = "b" not in mode
     try:
-        text = "b" not in mode
+        path.parent.mkdir(parents=True, exist_ok=True)
         with open(temporary, mode, encoding="utf-8" if text else None, newline="" if text else None) as handle:
             yield handle
             handle.flush()
             os.fsync(handle.fileno())
         os.replace(temporary, path)
+    except OSError as error:
+        if error.errno is None or error.filename not in (None, str(temporary)):
+            raise
+        raise OSError(error.errno, os.strerror(error.errno), str(path)) from error
     finally:
-        temporary.unlink(missing_ok=True)
+        with suppress(OSError):
+            temporary.unlink()
 
 
 def _read(path: Path | str, parse: Callable[[Path], Any], what: str) -> Any:
     path = Path(path)
     if not path.is_file():
         raise UserError(f"{path}: no such file; run the stage that makes it first")
+    verify(path)
     try:
         return parse(path)
     except UserError:
@@ -86,11 +98,23 @@ def read_json(path: Path | str) -> Any:
 def write_csv(path: Path | str, frame: "pd.DataFrame") -> None:
     """Write a tidy frame; floats with 9 significant digits, enough for float32."""
     with atomic(path) as handle:
-        frame.to_csv(handle, index=False, float_format="%.9g", lineterminator="\n")
+        render_csv(handle, frame)
+
+
+def render_csv(handle: IO[str], frame: "pd.DataFrame") -> None:
+    """Write a tidy frame into an open text file."""
+    frame.to_csv(handle, index=False, float_format="%.9g", lineterminator="\n")
+
+
+_NUMBERS = {"target", "seed", "episode", "step", "value", "low", "high", "n", "episodes"}
+"""Columns of tidy frames that hold numbers."""
 
 
 def read_csv(path: Path | str, columns: tuple[str, ...] = ()) -> "pd.DataFrame":
-    """Read a tidy frame and check that ``columns`` are there; empty cells of text columns stay empty strings."""
+    """Read a tidy frame and check that ``columns`` are there; empty cells of text columns stay empty strings.
+
+    A text in a column of numbers is an error that names both; an empty cell there is NaN.
+    """
     import pandas as pd
 
     names = ("task", "cs_reward", "method", "source", "experiment", "policy", "metric", "discriminator")
@@ -99,14 +123,19 @@ def read_csv(path: Path | str, columns: tuple[str, ...] = ()) -> "pd.DataFrame":
     def parse(p: Path) -> "pd.DataFrame":
         return pd.read_csv(p, dtype=text, keep_default_na=True).fillna(dict.fromkeys(text, ""))
 
-    frame = _read(path, parse, "CSV file")
-    return _with_columns(path, frame, columns)
+    frame = _with_columns(path, _read(path, parse, "CSV file"), columns)
+    for name in _NUMBERS & set(frame.columns):
+        if not pd.api.types.is_numeric_dtype(frame[name]):
+            texts = frame[name][pd.to_numeric(frame[name], errors="coerce").isna() & frame[name].notna()]
+            if len(texts):
+                raise UserError(f"{path}: column {name} holds {str(texts.iloc[0])[:40]!r}, not a number; make it again")
+    return frame
 
 
-def write_parquet(path: Path | str, frame: "pd.DataFrame") -> None:
-    """Write a frame as Parquet (zstd)."""
+def write_parquet(path: Path | str, frame: "pd.DataFrame", level: int | None = None) -> None:
+    """Write a frame as Parquet (zstd, at the library's level or ``level``)."""
     with atomic(path, "wb") as handle:
-        frame.to_parquet(handle, index=False, compression="zstd")
+        frame.to_parquet(handle, index=False, compression="zstd", compression_level=level)
 
 
 def read_parquet(path: Path | str, columns: tuple[str, ...] = ()) -> "pd.DataFrame":
@@ -145,12 +174,42 @@ def read_tensors(path: Path | str) -> "dict[str, torch.Tensor]":
 
 def checksum(path: Path | str) -> str:
     """SHA-256 of a file."""
-    return _read(path, lambda p: hashlib.sha256(p.read_bytes()).hexdigest(), "file")
+
+    def parse(p: Path) -> str:
+        with open(p, "rb") as handle:
+            return hashlib.file_digest(handle, "sha256").hexdigest()
+
+    return _read(path, parse, "file")
 
 
 def remove(path: Path | str) -> None:
     """Delete a file if it is there."""
     Path(path).unlink(missing_ok=True)
+
+
+def check_writable(path: Path | str, *, folder: bool) -> None:
+    """Find out before any work whether a folder, or else a file, can be written at ``path``. Leaves nothing.
+
+    Raises:
+        UserError: something else is there, or what it would be in cannot be written or is full.
+    """
+    path = Path(path)
+    if path.exists() and not (path.is_dir() or path.is_file()):
+        raise UserError(f"{path}: is neither a file nor a folder; choose another name")
+    if path.exists() and path.is_dir() != folder:
+        raise UserError(f"{path}: is a file; name a folder" if folder else f"{path}: is a folder; name a file")
+    place = next(one for one in (path, *path.absolute().parents) if one.exists())
+    place = place.parent if not folder and place == path else place
+    if not place.is_dir():
+        raise UserError(f"{place}: is a file, so that {path} cannot be made; write elsewhere")
+    try:
+        with tempfile.TemporaryFile(dir=place) as probe:
+            probe.write(b"\0" * 4096)
+            probe.flush()
+    except OSError as error:
+        raise UserError(
+            f"{place}: cannot be written ({error.strerror}); make room there, or write elsewhere"
+        ) from error
 
 
 def append_line(path: Path | str, line: str) -> None:
@@ -159,27 +218,3 @@ def append_line(path: Path | str, line: str) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     with open(path, "a", encoding="utf-8") as handle:
         handle.write(line.rstrip("\n") + "\n")
-
-
-@contextmanager
-def locked(folder: Path | str) -> Iterator[Path]:
-    """Hold ``folder`` (made if missing) for one process: an orphan job cannot write beside its successor."""
-    folder = Path(folder)
-    folder.mkdir(parents=True, exist_ok=True)
-    with open(folder / ".lock", "w") as handle:
-        try:
-            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError as error:
-            raise UserError(f"{folder}: another process writes here; wait for it or stop it") from error
-        yield folder
-    (folder / ".lock").unlink(missing_ok=True)
-
-
-def is_locked(folder: Path | str) -> bool:
-    """Whether a process holds ``folder``; looks at the kernel's list, so that asking never gets in a job's way."""
-    lock, held = Path(folder) / ".lock", Path("/proc/locks")
-    try:
-        inode = lock.stat().st_ino
-        return any(line.split()[5].endswith(f":{inode}") for line in held.read_text().splitlines())
-    except FileNotFoundError:
-        return lock.exists()

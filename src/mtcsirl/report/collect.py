@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from mtcsirl.errors import UserError
+from mtcsirl.errors import MissingError
 from mtcsirl.figures import figure_spec
 from mtcsirl.figures.style import caption_of
 from mtcsirl.files import storage
@@ -20,12 +20,13 @@ from mtcsirl.report.content import (
     TargetLine,
     WhatWasRun,
 )
-from mtcsirl.report.markdown import parse_table
+from mtcsirl.report.measured import measured
 from mtcsirl.settings import Settings
 from mtcsirl.settings.template import deviations
 from mtcsirl.study.design import ARTEFACTS, design
 from mtcsirl.study.outputs import OUTPUTS
-from mtcsirl.study.runs import Run, Study
+from mtcsirl.study.runs import AnyRun, Study
+from mtcsirl.tables.table import Table
 
 SUMMARY_TARGETS = {"claims": "the verdicts on all claims", "report": "this page", "all": "everything"}
 
@@ -36,24 +37,26 @@ def collect(settings: Settings, page: Path, *, partial: bool = False) -> ReportD
     Raises UserError when something is missing and ``partial`` is false.
     """
     study = design(settings)
-    results = Path(settings.results)
+    results, claims = Path(settings.results), Path(settings.results) / "claims" / "claims"
     provenance = {run: found for run in study if (found := _json(run, settings, "provenance.json"))}
     missing = [(name, _title(name)) for name in ARTEFACTS if not _picture_or_table(name, settings).is_file()]
     if missing and not partial:
         path = _picture_or_table(missing[0][0], settings)
-        raise UserError(f"{path}: not there; make it with `snakemake {missing[0][0]}`, or ask for --partial results")
+        raise MissingError(f"{path}: not there")
     there = [name for name in ARTEFACTS if name not in dict(missing)]
     return ReportData(
         run=_what_was_run(settings, study, provenance),
-        claims=_claims(results / "claims" / "claims.json", partial),
+        claims=_claims(claims.with_suffix(".json"), partial),
         tables=tuple(_table(name, settings, page) for name in there if name.startswith("table_")),
         figures=tuple(_figure(name, settings, page) for name in there if name.startswith("figure_")),
         gates=_gates(study, results),
         deviations=tuple(_deviation_lines(settings)),
         targets=tuple(_targets(settings, study, provenance)),
         missing=tuple(missing),
-        links=_links(page, (("verdicts as data", results / "claims" / "claims.json"),)),
-        claims_picture=_optional_picture("claims_picture", "All verdicts", results / "claims" / "claims.png"),
+        links=_links(
+            page, (("every number (JSON)", claims.with_suffix(".json")), ("Markdown", claims.with_suffix(".md")))
+        ),
+        claims_picture=_optional_picture("claims_picture", "All verdicts", claims.with_suffix(".png")),
     )
 
 
@@ -72,18 +75,21 @@ TABLE_TITLES = {
 }
 
 
+TABLE_FILES = (("its rows (CSV)", "csv"), ("Markdown", "md"), ("LaTeX", "tex"), ("JSON", "json"))
+
+
 def _picture_or_table(name: str, settings: Settings) -> Path:
     if name.startswith("figure_"):
         return Path(settings.figures) / f"{name}.png"
-    return Path(settings.results) / "tables" / f"{name}.md"
+    return Path(settings.results) / "tables" / f"{name}.json"
 
 
 def _table(name: str, settings: Settings, page: Path) -> TableView:
     path = _picture_or_table(name, settings)
-    table = parse_table(storage.read_text(path), path)
-    files = ((ending.upper(), path.with_suffix(f".{ending}")) for ending in ("csv", "md", "tex"))
-    picture = _optional_picture(f"{name}_picture", "as a heat map", path.with_suffix(".png"))
-    return TableView(name, table.caption, table.head, table.rows, table.notes, _links(page, tuple(files)), picture)
+    table = Table.from_json(storage.read_json(path), path)
+    files = tuple((text, path.with_suffix(f".{ending}")) for text, ending in TABLE_FILES)
+    picture = _optional_picture(f"{name}_picture", "As a heat map", path.with_suffix(".png"))
+    return TableView(name, _title(name), table, _links(page, files), picture)
 
 
 def _figure(name: str, settings: Settings, page: Path) -> FigureView:
@@ -106,7 +112,7 @@ def _links(page: Path, files: tuple[tuple[str, Path], ...]) -> tuple[tuple[str, 
     return tuple((text, Path(os.path.relpath(file, page.parent)).as_posix()) for text, file in files if file.is_file())
 
 
-def _targets(settings: Settings, study: Study, provenance: dict[Run, dict[str, Any]]) -> Iterator[TargetLine]:
+def _targets(settings: Settings, study: Study, provenance: dict[AnyRun, dict[str, Any]]) -> Iterator[TargetLine]:
     """Every artefact with the cost of the runs that it needs, as measured; artefacts share runs."""
     wanted = {name: (_title(name), design(settings, name)) for name in ARTEFACTS}
     for name, (text, own) in (wanted | {name: (text, study) for name, text in SUMMARY_TARGETS.items()}).items():
@@ -114,7 +120,7 @@ def _targets(settings: Settings, study: Study, provenance: dict[Run, dict[str, A
         yield TargetLine(name, text, len(costs), sum(own.jobs().values()), sum(costs))
 
 
-def _what_was_run(settings: Settings, study: Study, provenance: dict[Run, dict[str, Any]]) -> WhatWasRun:
+def _what_was_run(settings: Settings, study: Study, provenance: dict[AnyRun, dict[str, Any]]) -> WhatWasRun:
     return WhatWasRun(
         scale=settings.scale,
         seeds=settings.seeds,
@@ -125,7 +131,7 @@ def _what_was_run(settings: Settings, study: Study, provenance: dict[Run, dict[s
     )
 
 
-def _json(run: Run, settings: Settings, name: str) -> dict[str, Any] | None:
+def _json(run: AnyRun, settings: Settings, name: str) -> dict[str, Any] | None:
     path = Path(settings.results) / run.folder / name
     return storage.read_json(path) if path.is_file() else None
 
@@ -134,7 +140,7 @@ def _machine(found: dict[str, Any]) -> str:
     return f"{found['processor']}, {found['cores']} cores, {found['system']}, Python {found['python']}"
 
 
-def _stage_cost(stage: str, study: Study, provenance: dict[Run, dict[str, Any]]) -> StageCost:
+def _stage_cost(stage: str, study: Study, provenance: dict[AnyRun, dict[str, Any]]) -> StageCost:
     costs = [found["cost"] for run, found in provenance.items() if run.stage == stage]
     return StageCost(
         stage=stage,
@@ -158,7 +164,7 @@ def _claims(path: Path, partial: bool) -> tuple[Claim, ...]:
 def _claim(found: dict[str, Any]) -> Claim:
     units = tuple(unit["texts"] for unit in found["units"])
     texts = {name: found[name] for name in ("name", "text", "locus", "criterion", "verdict", "reason")}
-    return Claim(**texts, units=units)
+    return Claim(**texts, units=units, measured=measured(found["units"]))
 
 
 def _gates(study: Study, results: Path) -> tuple[GateLine, ...]:
@@ -173,12 +179,12 @@ def _gates(study: Study, results: Path) -> tuple[GateLine, ...]:
     return tuple(_gate_line(key, gates) for key, gates in groups.items())
 
 
-def _members(run: Run, gate: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
+def _members(run: AnyRun, gate: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
     if "members" in gate:
         for verdict in gate["members"]:
             yield verdict["task"], verdict
     else:
-        yield run.task, gate  # type: ignore[union-attr]
+        yield str(run.key["task"]), gate
 
 
 AGENT_NAMES = {
@@ -190,14 +196,14 @@ AGENT_NAMES = {
 }
 
 
-def _agent_name(run: Run) -> str:
+def _agent_name(run: AnyRun) -> str:
     """As in ``transfer agent, multi_task, mt_csirl``."""
     irl = getattr(run, "irl", run)
     parts = [AGENT_NAMES[run.stage], *(getattr(irl, name, "") for name in ("experiment", "method"))]
     return ", ".join(part.replace("_", " ") for part in parts if part)
 
 
-def _cs_reward(run: Run) -> str:
+def _cs_reward(run: AnyRun) -> str:
     return str(getattr(getattr(run, "irl", run), "cs_reward", ""))
 
 

@@ -1,11 +1,12 @@
 """How well a learned reward f agrees with the true cs-reward on a set of transitions.
 
-Three views, since none is right alone. Pearson and Spearman on the transitions as they are ignore scale and offset
+Four views, since none is right alone. Pearson and Spearman on the transitions as they are ignore scale and offset
 (and, Spearman, any monotone bend), but not what AIRL may add without changing what is optimal. The *residual*
 correlations therefore first remove, by least squares, the task reward and a linear potential difference from both f and
 the truth: Pearson's is 1 exactly if f = a r_cs + b r_task + gamma phi(s') - phi(s) + c with a > 0 and phi linear in the
-observation. EPIC removes every potential, but pairs states with successors that no policy ever saw together (see
-``epic_values``).
+observation. The *partial* correlation asks what f says of the truth beyond the task: it holds r_task fixed, and so is
+NaN for f = -r_task, which correlates with the truth wherever slow policies please the task. EPIC removes every
+potential, but pairs states with successors that no policy ever saw together (see ``epic_values``).
 """
 
 from collections.abc import Callable
@@ -18,7 +19,12 @@ from scipy.stats import rankdata
 from mtcsirl.results.statistics import Array, Estimate, cluster_bootstrap
 from mtcsirl.transitions import RewardFunction, Transitions
 
-Correlation = Callable[[Array, Array], float]
+Correlation = Callable[..., float]
+"""Of two vectors [N], or of three with the one that is held fixed last."""
+
+
+NOTHING_LEFT = 1e-10
+"""1 - r^2 below which a reward in float32 is a straight line in another."""
 
 
 def pearson(x: Array, y: Array) -> float:
@@ -31,6 +37,21 @@ def pearson(x: Array, y: Array) -> float:
 def spearman(x: Array, y: Array) -> float:
     """Spearman's rank correlation of two vectors; NaN if one of them does not vary."""
     return pearson(rankdata(x), rankdata(y))
+
+
+def partial_correlation(f: Array, c: Array, t: Array) -> float:
+    """Pearson's r of ``f`` and ``c`` [N] given ``t`` [N]: of what a straight line in t leaves of both.
+
+    r_fc.t = (r_fc - r_ft r_ct) / sqrt((1 - r_ft^2) (1 - r_ct^2)). NaN where f or c do not vary or are a straight line
+    in t, to the rounding of float32: nothing is left of them. A t that does not vary explains nothing: then it is r_fc.
+    """
+    fc, ft, ct = pearson(f, c), pearson(f, t), pearson(c, t)
+    if np.isnan(ft) and np.isnan(ct):  # t does not vary; or f or c neither, and then fc is NaN too
+        return fc
+    left = (1 - ft**2) * (1 - ct**2)
+    if np.isnan(left) or min(1 - ft**2, 1 - ct**2) < NOTHING_LEFT:
+        return np.nan
+    return float(np.clip((fc - ft * ct) / np.sqrt(left), -1.0, 1.0))
 
 
 def nuisance(transitions: Transitions, discount: float) -> Array:
@@ -107,30 +128,35 @@ def epic_distance(first: Array, second: Array) -> float:
 class Views(NamedTuple):
     """One learned and the true reward on the same transitions, by statistic."""
 
-    pairs: dict[str, tuple[Correlation, Array, Array]]
+    parts: dict[str, tuple[Correlation, tuple[Array, ...]]]
+    """The statistic's function and the vectors [N] that it takes."""
 
     def estimate(
         self, statistic: str, episodes: np.ndarray, generator: np.random.Generator, resamples: int
     ) -> Estimate:
         """The statistic with its cluster-bootstrap interval over episodes (0 resamples: without an interval)."""
-        measure, x, y = self.pairs[statistic]
+        measure, vectors = self.parts[statistic]
         if not resamples:
-            return Estimate(measure(x, y), np.nan, np.nan, len(np.unique(episodes)))
-        return cluster_bootstrap(lambda index: measure(x[index], y[index]), [episodes], generator, resamples=resamples)
+            return Estimate(measure(*vectors), np.nan, np.nan, len(np.unique(episodes)))
+        return cluster_bootstrap(
+            lambda index: measure(*(vector[index] for vector in vectors)), [episodes], generator, resamples=resamples
+        )
 
 
 def views(learned: Array, truth: Array, transitions: Transitions, discount: float) -> Views:
-    """Pearson and Spearman of ``learned`` and ``truth`` [N], as they are and with the nuisance removed from both.
+    """Pearson, Spearman and partial correlation of ``learned`` and ``truth`` [N], and the first two without nuisance.
 
-    The fit is made once; bootstrap intervals of the residual correlations hold it fixed.
+    The nuisance is fitted once: bootstrap intervals of the residual correlations hold the fit fixed. Those of the
+    partial correlation fit the task reward anew in every resample.
     """
     columns = nuisance(transitions, discount)
     rest = remove(learned, columns), remove(truth, columns)
     return Views(
         {
-            "pearson": (pearson, learned, truth),
-            "spearman": (spearman, learned, truth),
-            "pearson_residual": (pearson, *rest),
-            "spearman_residual": (spearman, *rest),
+            "pearson": (pearson, (learned, truth)),
+            "spearman": (spearman, (learned, truth)),
+            "partial": (partial_correlation, (learned, truth, transitions.task_reward.double().numpy())),
+            "pearson_residual": (pearson, rest),
+            "spearman_residual": (spearman, rest),
         }
     )

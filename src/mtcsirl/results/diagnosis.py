@@ -8,15 +8,19 @@ tells all apart and 0.5 for one that tells nothing apart:
 - ``asleep``: at most ``BLIND`` although the generator is below its gate, so there is something to tell apart
 - ``matched``: at most ``BLIND`` and the generator passed
 - ``at work``: between the two
+- ``no number``: an accuracy, f's mean or its gradient is none in one of these iterations
 """
 
+import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
 
+from mtcsirl.errors import UserError
 from mtcsirl.files import storage
+from mtcsirl.results.rows import run_key
 from mtcsirl.study.outputs import DIAGNOSTIC_COLUMNS
 from mtcsirl.study.runs import IrlRun
 
@@ -40,8 +44,14 @@ def read_diagnoses(runs: Sequence[IrlRun], results: Path | str) -> pd.DataFrame:
     for run in runs:
         folder = Path(results) / run.folder
         rows = storage.read_csv(folder / "diagnostics.csv", DIAGNOSTIC_COLUMNS)
-        gates = storage.read_json(folder / "gate.json")["members"]
-        frames.append(diagnose(rows, gates).assign(**{name: getattr(run, name) for name in RUN}))
+        gate = storage.read_json(folder / "gate.json")
+        try:
+            found = diagnose(rows, gate["members"])
+        except (KeyError, TypeError) as error:
+            raise UserError(
+                f"{folder}: gate.json or diagnostics.csv lacks {error} of a generator; make the run again"
+            ) from error
+        frames.append(found.assign(**run_key(run) | {"seed": run.seed}).drop(columns="stage"))
     return pd.concat(frames, ignore_index=True)[list(COLUMNS)] if frames else pd.DataFrame(columns=list(COLUMNS))
 
 
@@ -52,7 +62,9 @@ def diagnose(diagnostics: pd.DataFrame, gates: Sequence[Mapping[str, Any]]) -> p
     """
     late = diagnostics[diagnostics["step"] > (1 - LAST_SHARE) * diagnostics["step"].max()]
     key = ["task", "target", "discriminator"]
-    means = late.groupby([*key, "metric"])["value"].mean().unstack("metric")
+    values = late.groupby([*key, "metric"])["value"]
+    # A mean over some of the iterations is none: NaN logits count as wrong ones and would look like a sleeping network.
+    means = values.mean().where(values.count() == values.size()).unstack("metric")
     rows = []
     for gate in gates:
         member = means.loc[(gate["task"], gate["target"])]
@@ -60,13 +72,16 @@ def diagnose(diagnostics: pd.DataFrame, gates: Sequence[Mapping[str, Any]]) -> p
         judged |= {name: float(member.at["", name]) for name in OF_GENERATOR}
         for name in member.index.drop(""):
             own = {metric: float(member.at[name, metric]) for metric in OF_DISCRIMINATOR}
-            accuracy = (own["accuracy_expert"] + own["accuracy_generator"]) / 2
+            known = all(map(math.isfinite, own.values()))
+            accuracy = (own["accuracy_expert"] + own["accuracy_generator"]) / 2 if known else math.nan
             rows.append(judged | own | {"discriminator": name, "state": state(accuracy, bool(gate["passed"]))})
     return pd.DataFrame(rows)
 
 
 def state(accuracy: float, passed: bool) -> str:
     """What a balanced accuracy means for a generator that passed its gate or did not."""
+    if not math.isfinite(accuracy):
+        return "no number"
     if accuracy >= SATURATED:
         return "saturated"
     if accuracy > BLIND:

@@ -15,6 +15,7 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy import stats
 
+from mtcsirl.results.correlation import NOTHING_LEFT
 from mtcsirl.results.statistics import Array, Estimate
 
 POLICIES = ("sac", "expert", "generator", "uniform")
@@ -24,7 +25,7 @@ SHARED = ("sac", "expert")
 Counts = NDArray[np.int64]
 _PAIRS = (("f", "f"), ("c", "c"), ("t", "t"), ("f", "c"), ("f", "t"), ("c", "t"))
 _LIMIT = 1 - 1e-9
-"""A correlation of 1 has no Fisher z; and f or c that t explains to this share has no partial correlation."""
+"""A correlation of 1 has no Fisher z."""
 
 
 @dataclass(frozen=True)
@@ -36,11 +37,12 @@ class Correlations:
     beyond: Array
 
 
-def partial_correlation(fc: Array, ft: Array, ct: Array) -> Array:
-    """r_fc.t [...] of three correlations; NaN where t alone gives one of f and c."""
-    rest = (1 - ft**2) * (1 - ct**2)
-    known = rest > (1 - _LIMIT)
-    return np.where(known, (fc - ft * ct) / np.sqrt(np.where(known, rest, 1.0)), np.nan)
+def given_task(fc: Array, ft: Array, ct: Array) -> Array:
+    """r_fc.t [...] of three correlations; NaN where f or c is a straight line in t: nothing is left of it."""
+    rest = np.minimum(1 - ft**2, 1 - ct**2)
+    known = rest > NOTHING_LEFT
+    scale = np.sqrt(np.where(known, (1 - ft**2) * (1 - ct**2), 1.0))
+    return np.where(known, (fc - ft * ct) / scale, np.nan)
 
 
 def episode_sums(points: pd.DataFrame) -> pd.DataFrame:
@@ -48,7 +50,8 @@ def episode_sums(points: pd.DataFrame) -> pd.DataFrame:
 
     f, c and t are centred per seed first, which no correlation sees and floating point does.
     """
-    columns = {"f": points["learned"], "c": points["truth"], "t": points["task_reward"]}
+    names = {"f": "learned", "c": "truth", "t": "task_reward"}
+    columns = {name: points[column].astype(float) for name, column in names.items()}
     centred = {name: values - values.groupby(points["seed"]).transform("mean") for name, values in columns.items()}
     sums = points[["seed", "transitions", "agent", "episode"]].assign(n=1.0, **centred)
     sums = sums.assign(**{a + b: centred[a] * centred[b] for a, b in _PAIRS})
@@ -69,7 +72,7 @@ def correlations(sums: Array) -> Correlations:
     r_fc, r_ft, r_ct = r(fc, 0, 1, (f, c)), r(ft, 0, 2, (f, t)), r(ct, 1, 2, (c, t))
     # A task reward that never varies explains nothing.
     r_ft, r_ct = (np.where(spreads[2] > 1e-12, x, 0.0) for x in (r_ft, r_ct))
-    return Correlations(partial_correlation(r_fc, r_ft, r_ct), r_fc, r_fc + r_ct)
+    return Correlations(given_task(r_fc, r_ft, r_ct), r_fc, r_fc + r_ct)
 
 
 @dataclass(frozen=True)

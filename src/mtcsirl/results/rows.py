@@ -11,64 +11,78 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from mtcsirl.errors import UserError
+from mtcsirl.errors import MissingError, UserError
 from mtcsirl.files import storage
-from mtcsirl.settings.study import CS_REWARDS
-from mtcsirl.study.runs import Baseline, Demonstrations, Expert, IrlRun, Run, Study, Transfer
+from mtcsirl.names import CS_REWARDS, DIVERGED, KEPT, LAST, distance_metric
+from mtcsirl.results.completeness import POLICIES, what_lacks
+from mtcsirl.settings import Settings
+from mtcsirl.study import standing as standings
+from mtcsirl.study.runs import AnyRun, Baseline, Demonstrations, Expert, IrlRun, Runs, Transfer
+from mtcsirl.study.standing import DONE, standing
 
 KEY = ("stage", "experiment", "method", "cs_reward", "source", "task", "target", "seed")
-ROW_COLUMNS = (*KEY, "policy", "metric", "value", "episodes", "status", "folder")
+ROW_COLUMNS = (*KEY, "policy", "kept", "metric", "value", "episodes", "diverged", "status", "lacks", "folder")
 CURVE_COLUMNS = (*KEY, "step", "metric", "value")
 RUN_KEY = ("experiment", "method", "cs_reward", "source", "seed")
 SCORE_COLUMNS = (*RUN_KEY, "transitions", "reward", "statistic", "value", "low", "high", "n")
-POINT_COLUMNS = (*RUN_KEY, "transitions", "episode", "truth", "learned", "task_reward")
-EVALUATION_COLUMNS = ("task", "target", "seed", "policy", "episode", "metric", "value")
+POINT_COLUMNS = (*RUN_KEY, "transitions", "agent", "episode", "truth", "learned", "task_reward", "random")
+EVALUATION_COLUMNS = ("task", "target", "seed", "policy", "kept", "episode", "metric", "value")
 
-OK, BELOW_GATE, MISSING, DUPLICATED, FOREIGN = "ok", "below gate", "missing", "duplicated", "foreign"
+OK, BELOW_GATE, MISSING, DUPLICATED, FOREIGN, INCOMPLETE, STALE = (
+    "ok", "below gate", "missing", "duplicated", "foreign", "incomplete", "stale"
+)  # fmt: skip
 """Status of a run. Below gate: the agent did not learn what it had to; its value counts and is marked. Missing: no
 evaluation. Duplicated: the numbers of another seed, or an episode twice. Foreign: the file names another task, target
-or seed than its folder. The last three have the value NaN."""
+or seed than its folder. Incomplete: not the episodes, policies and metrics that the settings ask for, or values
+that are no numbers; ``lacks`` says which. Stale: made with other settings or code, or from other inputs. The last
+five have the value NaN: nothing is averaged over the rest."""
 
-POLICIES = ("stochastic", "deterministic")
 
-
-def evaluation_rows(study: Study, results: Path | str, *, partial: bool = False) -> pd.DataFrame:
+def evaluation_rows(study: Runs, settings: Settings, *, partial: bool = False, kept: str = KEPT) -> pd.DataFrame:
     """Every agent of ``study`` with its evaluation, ``ROW_COLUMNS``; agents are run x member for IRL runs.
 
+    ``settings``: the study's; a run that is not what they ask for is stale, whatever numbers it has. ``diverged``: in
+    how many episodes the simulation diverged; they count as failed. ``kept``: the policy that each run leaves behind;
+    see ``last_rows`` for the other.
     Demonstrations are rows too, of the stage ``collect_demonstrations`` with the seed of their expert: what their
     episodes reached and whether that passes the expert's gate.
 
     Raises:
-        UserError: a run is missing and ``partial`` is false; a file is unreadable.
+        UserError: a run is missing or stale and ``partial`` is false; a file is unreadable.
     """
     frames = []
+    names, asked = metrics(study), settings.evaluation.episodes
     for run in study:
+        if kept == LAST and not isinstance(run, Expert | Baseline):
+            continue
+        status, why = _standing(run, settings, partial)
+        folder = Path(settings.results) / run.folder
         for agent in agents(run):
-            folder = Path(results) / run.folder
-            if not (folder / "evaluation.csv").is_file():
-                _demand(folder / "evaluation.csv", partial)
-            frames.append(_agent_rows(agent, folder, metrics(study)))
-    frames += [_demonstration_rows(run, Path(results) / run.folder, partial) for run in study.demonstrations]
+            if status:
+                frames.append(_unusable(agent, folder, names, kept, status, why))
+            else:
+                frames.append(_agent_rows(agent, folder, names, asked, kept))
+        if kept == KEPT and isinstance(run, Demonstrations):
+            frames.append(_demonstration_rows(run, folder, status, why))
     rows = pd.concat(frames, ignore_index=True) if frames else pd.DataFrame({name: [] for name in ROW_COLUMNS})
     return _mark_equal_seeds(rows[list(ROW_COLUMNS)])
 
 
-def ablated_generators(study: Study, results: Path | str, experiment: str) -> pd.DataFrame:
-    """The generators of a variant, with the name of its ablation as their experiment; runs that are not there: none.
+def last_rows(study: Runs, settings: Settings, *, partial: bool = False) -> pd.DataFrame:
+    """``evaluation_rows`` of the last policies of experts and SAC, which keep their best; new agents keep their last.
 
-    A variant has the keys of the main study's runs: without a name of their own they would be taken for those.
+    No gate is asked of them: their status is never "below gate".
     """
-    rows = evaluation_rows(study, results, partial=True)
-    return select(rows, stage="learn_reward").assign(experiment=experiment)
+    return evaluation_rows(study, settings, partial=partial, kept=LAST)
 
 
-def curve_rows(study: Study, results: Path | str, *, partial: bool = False) -> pd.DataFrame:
-    """The learning curves of all agents of ``study``, ``CURVE_COLUMNS``; missing runs have no rows."""
+def curve_rows(study: Runs, settings: Settings, *, partial: bool = False) -> pd.DataFrame:
+    """The learning curves of all agents of ``study``, ``CURVE_COLUMNS``; missing and stale runs have no rows."""
     frames = []
     for run in study:
-        path = Path(results) / run.folder / "curve.csv"
+        path = Path(settings.results) / run.folder / "curve.csv"
         own_agents = list(agents(run))
-        if not own_agents or not _present(path, partial):
+        if not own_agents or _standing(run, settings, partial)[0]:
             continue
         curve = storage.read_csv(path, ("step", "metric", "value"))
         for agent in own_agents:
@@ -79,23 +93,26 @@ def curve_rows(study: Study, results: Path | str, *, partial: bool = False) -> p
     return _joined(frames, CURVE_COLUMNS)
 
 
-def score_rows(study: Study, results: Path | str, *, partial: bool = False) -> pd.DataFrame:
-    """Correlations of learned and true rewards, ``SCORE_COLUMNS`` + task; missing runs have no rows."""
-    return _of_scores(study, results, "scores.csv", (*SCORE_COLUMNS, "task"), partial)
+def score_rows(study: Runs, settings: Settings, *, partial: bool = False) -> pd.DataFrame:
+    """Correlations of learned and true rewards, ``SCORE_COLUMNS`` + task; missing and stale runs have no rows."""
+    return _of_scores(study, settings, "scores.csv", (*SCORE_COLUMNS, "task"), partial)
 
 
-def point_rows(study: Study, results: Path | str, *, partial: bool = False) -> pd.DataFrame:
-    """Single transitions of those correlations, ``POINT_COLUMNS`` + task; missing runs have no rows."""
-    return _of_scores(study, results, "points.parquet", (*POINT_COLUMNS, "task"), partial)
+def point_rows(study: Runs, settings: Settings, *, partial: bool = False) -> pd.DataFrame:
+    """Single transitions of those correlations, ``POINT_COLUMNS`` + task; missing and stale runs have no rows."""
+    return _of_scores(study, settings, "points.parquet", (*POINT_COLUMNS, "task"), partial)
 
 
-def _of_scores(study: Study, results: Path | str, name: str, columns: tuple[str, ...], partial: bool) -> pd.DataFrame:
+def _of_scores(study: Runs, settings: Settings, name: str, columns: tuple[str, ...], partial: bool) -> pd.DataFrame:
+    read = storage.read_parquet if name.endswith("parquet") else storage.read_csv
+    own = (*RUN_KEY, "task")
     frames = []
     for run in study.scores:
-        path = Path(results) / run.folder / name
-        if _present(path, partial):
-            frame = storage.read_parquet(path) if name.endswith("parquet") else storage.read_csv(path)
-            frames.append(frame.assign(**{key: getattr(run.irl, key) for key in RUN_KEY}, task=run.task))
+        path = Path(settings.results) / run.folder / name
+        if not _standing(run, settings, partial)[0]:
+            key = {part: getattr(run.irl, part) for part in RUN_KEY} | {"task": run.task}
+            frame = read(path, tuple(column for column in columns if column not in own))
+            frames.append(frame.assign(**key))
     return _joined(frames, columns)
 
 
@@ -124,7 +141,7 @@ def matrix(rows: pd.DataFrame) -> pd.DataFrame:
     return rows.pivot(index="seed", columns="task", values="value").astype(float)
 
 
-def agents(run: Run) -> Iterator[dict[str, Any]]:
+def agents(run: AnyRun) -> Iterator[dict[str, Any]]:
     """The ``KEY`` of each agent that ``run`` evaluates."""
     key = run_key(run)
     if isinstance(run, IrlRun):
@@ -134,66 +151,109 @@ def agents(run: Run) -> Iterator[dict[str, Any]]:
         yield key | {"task": run.task, "target": run.target, "seed": run.seed}
 
 
-def run_key(run: Run) -> dict[str, Any]:
-    """The part of ``KEY`` that all agents of ``run`` share."""
+def run_key(run: AnyRun) -> dict[str, Any]:
+    """The part of ``KEY`` that all agents of ``run`` share; a variant's experiment is its name, as ``ablation_x/y``."""
     irl = run.irl if isinstance(run, Transfer) else run if isinstance(run, IrlRun) else None
     return {
         "stage": run.stage,
-        "experiment": irl.experiment if irl else "",
+        "experiment": (run.key["variant"].removeprefix("ablations/").rstrip("/") or irl.experiment) if irl else "",
         "method": irl.method if irl else "",
         "cs_reward": irl.cs_reward if irl else getattr(run, "cs_reward", ""),
         "source": irl.source if irl else "",
     }
 
 
-def metrics(study: Study) -> tuple[str, ...]:
-    """What an evaluation measures: the paper's two cs-rewards, further ones of this study, success, task reward."""
+def metrics(study: Runs) -> tuple[str, ...]:
+    """What is read of an evaluation: success, mean and distance of cs-rewards, task reward.
+
+    The cs-rewards are the paper's two and further ones of this study.
+    """
     used = dict.fromkeys((*CS_REWARDS, *(x.cs_reward for x in study.experts), *(x.cs_reward for x in study.irl_runs)))
-    return ("success", *used, "task_reward")
+    return ("success", *used, *(distance_metric(name) for name in used), "task_reward")
 
 
-def _agent_rows(agent: dict[str, Any], folder: Path, names: tuple[str, ...]) -> pd.DataFrame:
+def _agent_rows(agent: dict[str, Any], folder: Path, names: tuple[str, ...], asked: int, kept: str) -> pd.DataFrame:
     """One row per policy and metric of one agent."""
     grid = pd.MultiIndex.from_product([POLICIES, names], names=["policy", "metric"])
-    rows = pd.DataFrame({"value": np.nan, "episodes": 0}, index=grid)
-    status = MISSING
+    rows = pd.DataFrame({"value": np.nan, "episodes": 0, "diverged": 0}, index=grid)
+    status, lacks = MISSING, ""
     path = folder / "evaluation.csv"
     if path.is_file():
         episodes = storage.read_csv(path, EVALUATION_COLUMNS)
         own = episodes[(episodes["task"] == agent["task"]) & (episodes["target"] == agent["target"])]
-        status = _status(agent, own, folder)
-        groups = own.groupby(["policy", "metric"])["value"]
+        chosen = own[own["kept"] == kept]
+        lacks = what_lacks(chosen, (*names, DIVERGED), asked)
+        status, lacks = _status(agent, own, lacks if len(own) or episodes.empty else "", folder, kept)
+        groups = chosen.groupby(["policy", "metric"])["value"]
         rows["episodes"] = groups.size().reindex(grid, fill_value=0)
         if status in (OK, BELOW_GATE):
             rows["value"] = groups.mean().reindex(grid)
-    return rows.reset_index().assign(**agent, status=status, folder=str(folder))
+            diverged = {policy: int(groups.get_group((policy, DIVERGED)).sum()) for policy in POLICIES}
+            rows["diverged"] = rows.index.get_level_values("policy").map(diverged)
+    return rows.reset_index().assign(**agent, kept=kept, status=status, lacks=lacks, folder=str(folder))
 
 
-def _demonstration_rows(run: Demonstrations, folder: Path, partial: bool) -> pd.DataFrame:
+def _unusable(
+    agent: dict[str, Any], folder: Path, names: tuple[str, ...], kept: str, status: str, why: str
+) -> pd.DataFrame:
+    """The rows of an agent without usable numbers."""
+    grid = pd.MultiIndex.from_product([POLICIES, names], names=["policy", "metric"])
+    rows = pd.DataFrame({"value": np.nan, "episodes": 0, "diverged": 0}, index=grid)
+    return rows.reset_index().assign(**agent, kept=kept, status=status, lacks=why, folder=str(folder))
+
+
+def _demonstration_rows(run: Demonstrations, folder: Path, status: str, why: str) -> pd.DataFrame:
     """Success and metric of one expert's demonstrations."""
     verdict: dict[str, Any] = {"success": np.nan, "metric": np.nan}
-    status = MISSING
-    if _present(folder / "gate.json", partial):
-        verdict = storage.read_json(folder / "gate.json")
+    if not status:
+        verdict = _verdict(folder / "gate.json")
         status = OK if verdict["passed"] else BELOW_GATE
     key = run_key(run) | {"task": run.task, "target": run.target, "seed": run.expert.seed}
     rows = pd.DataFrame(
-        {"policy": "stochastic", "metric": ["success", run.cs_reward], "value": [verdict["success"], verdict["metric"]]}
+        {
+            "policy": "stochastic",
+            "metric": ["success", run.cs_reward],
+            "value": np.array([verdict["success"], verdict["metric"]], dtype=float),  # None, which is no number: NaN
+        }
     )
-    return rows.assign(**key, episodes=0, status=status, folder=str(folder))
+    marks: dict[str, Any] = {"episodes": 0, "diverged": int(verdict.get("diverged", 0)), "status": status, "lacks": why}
+    return rows.assign(**key, **marks, kept=KEPT, folder=str(folder))
 
 
-def _status(agent: dict[str, Any], own: pd.DataFrame, folder: Path) -> str:
-    if own.empty or (own["seed"] != agent["seed"]).any():
-        return FOREIGN
-    if own.duplicated(["policy", "episode", "metric"]).any():
-        return DUPLICATED
+def _status(agent: dict[str, Any], own: pd.DataFrame, lacks: str, folder: Path, kept: str) -> tuple[str, str]:
+    """The status of an agent with its rows ``own``, of whatever policy, and what it lacks if it is incomplete."""
+    if own.empty and not lacks:
+        return FOREIGN, ""
+    if (own["seed"] != agent["seed"]).any():
+        return FOREIGN, ""
+    if own.duplicated(["policy", "kept", "episode", "metric"]).any():
+        return DUPLICATED, ""
+    if lacks:
+        return INCOMPLETE, lacks
+    if kept != KEPT:
+        return OK, ""
     gate = folder / "gate.json"
-    if gate.is_file():
-        verdict = storage.read_json(gate)
-        members = {(m["task"], m["target"]): m for m in verdict.get("members", [])}
-        return OK if members.get((agent["task"], agent["target"]), verdict)["passed"] else BELOW_GATE
-    return OK
+    if not gate.is_file():
+        return INCOMPLETE, "gate.json"
+    return (OK if _passed(gate, agent) else BELOW_GATE), ""
+
+
+def _passed(gate: Path, agent: dict[str, Any]) -> bool:
+    """Whether an agent passed, by the ``gate.json`` of its run.
+
+    Raises:
+        UserError: the file is no gate's.
+    """
+    verdict = _verdict(gate)
+    members = {(m.get("task"), m.get("target")): m for m in verdict.get("members", [])}
+    return bool(members.get((agent["task"], agent["target"]), verdict)["passed"])
+
+
+def _verdict(gate: Path) -> dict[str, Any]:
+    verdict = storage.read_json(gate)
+    if not isinstance(verdict, dict) or not {"passed", "success", "metric"} <= set(verdict):
+        raise UserError(f"{gate}: not the verdict of a gate; delete it and make its run again")
+    return verdict
 
 
 def _mark_equal_seeds(rows: pd.DataFrame) -> pd.DataFrame:
@@ -212,15 +272,18 @@ def _mark_equal_seeds(rows: pd.DataFrame) -> pd.DataFrame:
     )
 
 
-def _present(path: Path, partial: bool) -> bool:
-    if path.is_file():
-        return True
-    _demand(path, partial)
-    return False
+def _standing(run: AnyRun, settings: Settings, partial: bool) -> tuple[str, str]:
+    """MISSING or STALE and why, or nothing where the run is what the settings ask for.
 
-
-def _demand(path: Path, partial: bool) -> None:
+    Raises:
+        UserError: it is not, and ``partial`` is false.
+    """
+    found = standing(run, settings)
+    if found.state == DONE:
+        return "", ""
+    stale = found.state == standings.STALE
     if not partial:
-        raise UserError(
-            f"{path}: this run is missing; make it with `snakemake --cores 1 {path}`, or ask for --partial results"
-        )
+        state = "stale" if stale else "missing"
+        why = f" ({found.why[0]})" if found.why else ""
+        raise MissingError(f"{Path(settings.results) / run.folder}: this run is {state}{why}")
+    return (STALE, found.why[0]) if stale else (MISSING, "; ".join(found.why))

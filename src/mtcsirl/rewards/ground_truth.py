@@ -11,6 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from mtcsirl.names import QUANTITIES
 from mtcsirl.transitions import Transitions
 
 if TYPE_CHECKING:
@@ -50,6 +51,7 @@ class CommonSenseReward:
     """Maps transitions [..., *] in raw units to the measured value [...]."""
     target: float
     unit: str
+    """What stands beside its name on the axis of a figure."""
     weight: float = 1.0
 
     def __call__(self, transitions: Transitions) -> Tensor:
@@ -57,8 +59,14 @@ class CommonSenseReward:
         return -self.weight * (self.measure(transitions) - self.target).abs()
 
 
+def _of_the_paper(name: str, measure: Callable[[Transitions], Tensor]) -> CommonSenseReward:
+    _, unit, target = QUANTITIES[name]
+    assert target is not None
+    return CommonSenseReward(name, measure, target, unit)
+
+
 COMMON_SENSE_REWARDS: dict[str, CommonSenseReward] = {
-    "velocity": CommonSenseReward("velocity", velocity, target=0.8, unit="m/s"),
-    "action_norm": CommonSenseReward("action_norm", action_norm, target=3.0, unit="L1 norm"),
+    "velocity": _of_the_paper("velocity", velocity),
+    "action_norm": _of_the_paper("action_norm", action_norm),
 }
 """Equation (10): ``-C_v | ||l(s') - l(s)||_2 - v_target |``. Equation (11): ``-C_n | ||a||_1 - n_target |``."""

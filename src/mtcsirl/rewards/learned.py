@@ -1,5 +1,6 @@
 """A learned reward as an artefact: what IRL leaves behind and new agents train on."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -33,7 +34,20 @@ class LearnedReward:
     task_network: RewardNetwork | None = None
     task_offsets: tuple[float, ...] = ()
     about: dict[str, Any] = field(default_factory=dict)
-    """Anything else worth keeping in the description, such as experiment and seed."""
+    """Anything else worth keeping in the description, such as experiment, source and seed."""
+
+    @property
+    def experiment(self) -> str:
+        """The experiment that it was learned in; where it does not say, what its members make of it."""
+        tasks = {task for task, _ in self.members}
+        told = "single_target" if len(self.members) == 1 else "multi_target" if len(tasks) == 1 else "multi_task"
+        return str(self.about.get("experiment", told))
+
+    @property
+    def source(self) -> str:
+        """The task that it was learned from, or "all"; where it does not say, what its members make of it."""
+        tasks = sorted({task for task, _ in self.members})
+        return str(self.about.get("source", tasks[0] if len(tasks) == 1 else "all"))
 
     def __call__(self, transitions: Transitions) -> Tensor:
         """The learned reward f [...] of transitions [...]."""
@@ -81,7 +95,8 @@ def load_learned_reward(folder: Path | str) -> LearnedReward:
     """Read a reward that ``save_learned_reward`` wrote.
 
     Raises:
-        UserError: a file is missing, truncated, changed since it was written, or of another kind.
+        UserError: a file is missing, truncated, changed since it was written, of another kind, or holds a number that
+            is not finite.
     """
     weights, description = Path(folder) / WEIGHTS, Path(folder) / DESCRIPTION
     said = storage.read_json(description)
@@ -90,6 +105,9 @@ def load_learned_reward(folder: Path | str) -> LearnedReward:
     tensors = storage.read_tensors(weights)
     if storage.checksum(weights) != said.get("sha256"):
         raise UserError(f"{weights}: differs from the checksum in {DESCRIPTION}; learn the reward again")
+    broken = sorted(name for name, tensor in tensors.items() if not tensor.isfinite().all())
+    if broken:
+        raise UserError(f"{weights}: {', '.join(broken)} holds numbers that are not finite; learn the reward again")
     try:
         members = tuple((str(task), int(target)) for task, target in said["members"])
         networks = _networks(said["networks"], tensors, len(members))
@@ -99,13 +117,49 @@ def load_learned_reward(folder: Path | str) -> LearnedReward:
             cs_reward=said["cs_reward"],
             observation=said["observation"],
             members=members,
-            offset=float(said["offset"]),
+            offset=_finite(said["offset"]),
             task_network=networks.get("task"),
             task_offsets=_offsets(said["task_offsets"], len(members) if "task" in networks else 0),
             about=said["about"],
         )
     except (KeyError, TypeError, ValueError) as error:
         raise UserError(f"{description}: does not describe {WEIGHTS} ({error}); learn the reward again") from error
+
+
+def check_learned(
+    learned: LearnedReward,
+    folder: Path | str,
+    *,
+    cs_reward: str | None = None,
+    observation: str | None = None,
+    method: str | None = None,
+    experiment: str | None = None,
+) -> None:
+    """Refuse a reward from ``folder`` that is another than is asked for; what is None may be anything.
+
+    Raises:
+        UserError: it was learned from experts of another cs-reward, on other observations, by another method or in
+            another experiment.
+    """
+    if cs_reward is not None and learned.cs_reward != cs_reward:
+        raise UserError(f"{folder}: learned from {learned.cs_reward} experts; ask for --cs-reward {learned.cs_reward}")
+    if observation is not None and learned.observation != observation:
+        raise UserError(
+            f"{folder}: learned on {learned.observation!r} observations; set environment.observation to that"
+        )
+    if method is not None and learned.method != method:
+        raise UserError(f"{folder}: learned by {learned.method}, not by {method}; give the folder of that one's reward")
+    if experiment is not None and learned.experiment != experiment:
+        raise UserError(
+            f"{folder}: learned in the experiment {learned.experiment}, not in {experiment}; give that one's folder"
+        )
+
+
+def _finite(value: Any) -> float:
+    number = float(value)
+    if not math.isfinite(number):
+        raise ValueError(f"{value} is not finite")
+    return number
 
 
 def _networks(
@@ -121,4 +175,4 @@ def _networks(
 def _offsets(values: Sequence[float], expected: int) -> tuple[float, ...]:
     if len(values) != expected:
         raise ValueError(f"{len(values)} task offsets instead of {expected}")
-    return tuple(float(value) for value in values)
+    return tuple(_finite(value) for value in values)

@@ -5,17 +5,7 @@ are small overlays.
 """
 
 from mtcsirl.settings.budgets import granted
-from mtcsirl.settings.irl import DiscriminatorSettings, IrlSettings, ScoreSettings, TransferSettings
-from mtcsirl.settings.learner import (
-    EnvironmentSettings,
-    EvaluationSettings,
-    GateSettings,
-    LearnerSettings,
-    ProgressSettings,
-    RewardScaleSettings,
-    SacSettings,
-)
-from mtcsirl.settings.study import (
+from mtcsirl.settings.configuration import (
     BaselineSettings,
     DemonstrationSettings,
     ExpertSettings,
@@ -24,6 +14,16 @@ from mtcsirl.settings.study import (
     Settings,
     SingleTargetSettings,
     TransferStudySettings,
+)
+from mtcsirl.settings.irl import DiscriminatorSettings, GeneratorSettings, IrlSettings, ScoreSettings, TransferSettings
+from mtcsirl.settings.learner import (
+    EnvironmentSettings,
+    EvaluationSettings,
+    GateSettings,
+    LearnerSettings,
+    ProgressSettings,
+    RewardScaleSettings,
+    SacSettings,
 )
 
 __all__ = [
@@ -34,6 +34,7 @@ __all__ = [
     "EvaluationSettings",
     "ExpertSettings",
     "GateSettings",
+    "GeneratorSettings",
     "IrlSettings",
     "LearnerSettings",
     "MultiTargetSettings",

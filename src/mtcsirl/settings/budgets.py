@@ -5,7 +5,7 @@ from typing import Annotated, TypeVar
 
 from pydantic import AfterValidator, Field
 
-from mtcsirl.names import TASKS
+from mtcsirl.names import EXPERIMENTS, TASKS
 
 
 def known_task(name: str) -> str:
@@ -30,6 +30,13 @@ def known_keys(budget: dict[str, Number]) -> dict[str, Number]:
     return budget
 
 
+def every_experiment(counts: dict[str, int]) -> dict[str, int]:
+    """``counts``, or ValueError: an experiment is missing or unknown."""
+    if set(counts) != set(EXPERIMENTS):
+        raise ValueError(f"needs exactly the keys {', '.join(EXPERIMENTS)}")
+    return counts
+
+
 Task = Annotated[str, AfterValidator(known_task)]
 Budget = Annotated[dict[str, Annotated[int, Field(gt=0)]], AfterValidator(known_keys)]
 """Environment steps: the key ``default`` and one key per task that differs."""
@@ -37,6 +44,9 @@ Iterations = Annotated[dict[str, Annotated[int, Field(ge=0)]], AfterValidator(kn
 """Iterations of IRL, likewise; none is allowed."""
 Shares = Annotated[dict[str, Annotated[float, Field(ge=0, le=1)]], AfterValidator(known_keys)]
 """Shares in [0, 1], likewise."""
+
+Updates = Annotated[dict[str, Annotated[int, Field(gt=0)]], AfterValidator(every_experiment)]
+"""Updates per iteration, one number for each experiment."""
 
 
 def granted(budget: Mapping[str, Number], task: str) -> Number:

@@ -4,14 +4,16 @@ from typing import Literal
 
 from pydantic import Field
 
+from mtcsirl.names import EXPERIMENTS
 from mtcsirl.settings.base import Frozen, key
-from mtcsirl.settings.learner import RewardScaleSettings, Temperature
+from mtcsirl.settings.budgets import Updates
+from mtcsirl.settings.learner import RewardScaleSettings, Sizes, Temperature
 
 
 class DiscriminatorSettings(Frozen):
     """The learned reward f and how it is trained."""
 
-    hidden_sizes: tuple[int, ...] = key((128, 128), "hidden layers of f", unit="units", min_length=1)
+    hidden_sizes: Sizes = key((128, 128), "hidden layers of f", unit="units")
     learning_rate: float = key(1.0e-4, "Adam step size of f", gt=0)
     minibatch: int = key(256, "expert and again generator transitions per task and update", unit="transitions", gt=0)
     output_scale: float = key(10.0, "f = output_scale x network", gt=0)
@@ -20,9 +22,7 @@ class DiscriminatorSettings(Frozen):
     )
     log_pi_clamp: float = key(10.0, "log pi is clamped to +- this in the logit", unit="nats", gt=0)
     shaping: bool = key(False, "add gamma h(s') - h(s) to the logit and leave it out of the learned reward")
-    bottleneck_hidden_sizes: tuple[int, ...] = key(
-        (32, 32), "VAIRL: hidden layers of the encoder", unit="units", min_length=1
-    )
+    bottleneck_hidden_sizes: Sizes = key((32, 32), "VAIRL: hidden layers of the encoder", unit="units")
     bottleneck_size: int = key(32, "VAIRL: size of z", unit="units", gt=0)
     information_constraint: float = key(0.5, "VAIRL: I_c on the summed KL", unit="nats", gt=0)
     initial_beta: float = key(0.005, "VAIRL: start of the multiplier beta", ge=0)
@@ -33,7 +33,7 @@ class DiscriminatorSettings(Frozen):
 
 
 class IrlAlgorithmSettings(Frozen):
-    """Algorithms 1 and 2; how long generators warm up is a matter of their tasks."""
+    """Algorithms 1 and 2 but for what depends on tasks (the warm-up) or on the experiment (updates)."""
 
     iterations: int = key(120, "N: outer iterations after the warm-up", unit="iterations", gt=0)
     steps_per_iteration: int = key(
@@ -43,8 +43,6 @@ class IrlAlgorithmSettings(Frozen):
         paper=500,
         gt=0,
     )
-    discriminator_updates: int = key(40, "D_updates per task and iteration", unit="updates", paper=15, gt=0)
-    generator_updates: int = key(250, "G_updates per task and iteration", unit="updates", paper=15, gt=0)
     generator_replay: int = key(
         20,
         "generator samples come from the last this many iterations; 1 = latest rollout",
@@ -99,6 +97,17 @@ class IrlAlgorithmSettings(Frozen):
         " no preference changes, the critics' targets move less",
         paper=False,
     )
+    warm_up_temperature: Literal["automatic", "as_in_irl"] = key(
+        "automatic",
+        "generators in their warm-up: automatic, as plain SAC, or that of IRL; at temperature 1 the entropy bonus hides"
+        " task rewards below 1, and a task that pays late is not found",
+    )
+    discriminator: DiscriminatorSettings = key(DiscriminatorSettings, "the learned reward")
+
+
+class GeneratorSettings(Frozen):
+    """The generators' temperature and scale in a study; a run has what ``scaling`` makes of them, in ``sac``."""
+
     temperature: Temperature = key(1.0, "generators: automatic or fixed entropy temperature", paper="automatic")
     initial_temperature: float = key(0.05, "generators: start of the automatic temperature", gt=0)
     reward_scale: float = key(
@@ -108,12 +117,6 @@ class IrlAlgorithmSettings(Frozen):
         paper=1.0,
         gt=0,
     )
-    warm_up_temperature: Literal["automatic", "as_in_irl"] = key(
-        "automatic",
-        "generators in their warm-up: automatic, as plain SAC, or that of IRL; at temperature 1 the entropy bonus hides"
-        " task rewards below 1, and a task that pays late is not found",
-    )
-    discriminator: DiscriminatorSettings = key(DiscriminatorSettings, "the learned reward")
 
     def scaling(self) -> RewardScaleSettings:
         """Temperature and scale of the generators' SAC: scaled together, they leave the optimal policy as it is."""
@@ -125,9 +128,36 @@ class IrlAlgorithmSettings(Frozen):
         )
 
 
+class IrlUpdateSettings(IrlAlgorithmSettings):
+    """Algorithms 1 and 2 with the updates of each experiment, as the configuration has them."""
+
+    discriminator_updates: Updates = key(
+        lambda: dict.fromkeys(EXPERIMENTS, 40),
+        "D_updates per task and iteration, by experiment",
+        unit="updates",
+        paper={"single_target": 15, "multi_target": 15, "multi_task": 10},
+    )
+    generator_updates: Updates = key(
+        lambda: dict.fromkeys(EXPERIMENTS, 250),
+        "G_updates per task and iteration, by experiment",
+        unit="updates",
+        paper={"single_target": 15, "multi_target": 15, "multi_task": 20},
+    )
+    discriminator_update: Literal["gradient_step", "epoch"] = key(
+        "gradient_step", "one of D_updates: one gradient step, or as many as an epoch has steps (steps_per_iteration)"
+    )
+    generator_update: Literal["gradient_step", "epoch"] = key(
+        "gradient_step",
+        "one of G_updates: one gradient step; or an epoch as SAC has them: steps_per_iteration environment steps and as"
+        " many gradient steps, so that an iteration collects G_updates times as much",
+    )
+
+
 class IrlSettings(IrlAlgorithmSettings):
     """Algorithms 1 and 2 as one run has them."""
 
+    discriminator_updates: int = Field(default=40, gt=0, description="gradient steps per task and iteration")
+    generator_updates: int = Field(default=250, gt=0, description="gradient steps per task and iteration")
     warm_up_iterations: int = Field(default=0, ge=0, description="that of the run's slowest task")
 
 

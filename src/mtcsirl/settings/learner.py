@@ -1,13 +1,23 @@
 """Settings of the environment, of the SAC learner and of its training loop."""
 
-from typing import Annotated, Literal
+import re
+from typing import Annotated, Literal, Self
 
-from pydantic import Field
+from pydantic import AfterValidator, Field, model_validator
 
+from mtcsirl.names import HIGHEST_TARGET_SEED
 from mtcsirl.settings.base import Frozen, key
 
 Positive = Annotated[float, Field(gt=0)]
+Sizes = Annotated[tuple[Annotated[int, Field(gt=0)], ...], Field(min_length=1)]
+"""Units of each hidden layer."""
 Temperature = Literal["automatic"] | Positive
+
+
+def _device(name: str) -> str:
+    if not re.fullmatch(r"cpu|cuda(:\d{1,2})?", name):
+        raise ValueError("must be cpu, cuda or cuda:INDEX")
+    return name
 
 
 class EnvironmentSettings(Frozen):
@@ -18,15 +28,14 @@ class EnvironmentSettings(Frozen):
         "mapped = invertible linear map that lets a network read velocity; raw = as Meta-World has it",
         paper="raw",
     )
-    target_seed: int = key(0, "seed from which Meta-World draws the 50 targets of a task", ge=0)
+    target_seed: int = key(0, "seed from which Meta-World draws the 50 targets of a task", ge=0, le=HIGHEST_TARGET_SEED)
 
 
 class LearnerSettings(Frozen):
     """The part of SAC that every agent of the suite shares (the paper's Table 5)."""
 
-    hidden_sizes: tuple[int, ...] = key(
-        (256, 256), "hidden layers of actor and critics", unit="units", paper=(256, 256), min_length=1
-    )
+    hidden_sizes: Sizes = key((256, 256), "hidden layers of actor and critics", unit="units", paper=(256, 256))
+    critics: int = key(2, "critics of an agent; their least value counts", unit="networks", absent=2, ge=1)
     policy_learning_rate: float = key(1.0e-3, "Adam step size of the actor", paper=3.0e-4, gt=0)
     critic_learning_rate: float = key(1.0e-3, "Adam step size of the critics", paper=3.0e-4, gt=0)
     temperature_learning_rate: float = key(
@@ -46,7 +55,13 @@ class LearnerSettings(Frozen):
     learner: Literal["fused", "stable_baselines3"] = key(
         "fused", "fused = this package's engine; stable_baselines3 = the reference"
     )
-    device: str = key("cpu", "torch device of the learner")
+    device: Annotated[str, AfterValidator(_device)] = key("cpu", "torch device of the learner: cpu, cuda or cuda:INDEX")
+
+    @model_validator(mode="after")
+    def _bounds(self) -> Self:
+        if self.min_log_std >= self.max_log_std:
+            raise ValueError(f"min_log_std = {self.min_log_std:g} must be below max_log_std = {self.max_log_std:g}")
+        return self
 
 
 class SacSettings(LearnerSettings):
@@ -101,7 +116,9 @@ class GateSettings(Frozen):
 class ProgressSettings(Frozen):
     """How a training job reports, saves and selects."""
 
-    checkpoint_every: int = key(20_000, "distance of two resume checkpoints", unit="environment steps", gt=0)
+    checkpoint_every: int = key(
+        20_000, "distance of two resume checkpoints", unit="environment steps", neutral=True, gt=0
+    )
     select_every: int = key(
         5_000,
         "distance of two trials of the policy for the best one by the gate",
@@ -115,4 +132,4 @@ class ProgressSettings(Frozen):
         unit="episodes",
         ge=0,
     )
-    tensorboard: bool = key(False, "write TensorBoard event files beside curve.csv")
+    tensorboard: bool = key(False, "write TensorBoard event files beside curve.csv", neutral=True)

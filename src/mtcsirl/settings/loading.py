@@ -5,42 +5,47 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any, TypeVar
 
-import yaml
 from pydantic import BaseModel, ValidationError
 
 from mtcsirl.errors import UserError
 from mtcsirl.files.storage import read_text
-from mtcsirl.settings.study import Settings
+from mtcsirl.settings.configuration import Settings
+from mtcsirl.settings.scale import check_scale
+from mtcsirl.settings.strict import StrictError, parse
 
 Model = TypeVar("Model", bound=BaseModel)
-CONFIG_FOLDERS = (Path("config"), Path(__file__).resolve().parents[3] / "config")
-"""Where the configuration is looked for: below the working directory, then in the checkout."""
+CONFIG = Path(__file__).resolve().parents[3] / "config"
+"""The configuration of the checkout, whatever the working directory: the one that the Snakefile reads too."""
 
 
 def load(files: Iterable[Path | str] = (), overrides: Iterable[str] = (), scale: str | None = None) -> Settings:
     """Settings from ``config/config.yaml``, the overlay of ``scale``, further ``files``, then ``key=value`` overrides.
 
     Later ones win; mappings merge and lists are replaced, as with ``snakemake --configfile``. Without a
-    ``config.yaml`` the defaults of the classes stand in for it: they are the same.
+    ``config.yaml`` (an installed package) the defaults of the classes stand in for it: they are the same.
     """
-    named = [path for path in (_config("config.yaml"),) if path is not None]
+    named = [CONFIG / "config.yaml"] if (CONFIG / "config.yaml").is_file() else []
     if scale not in (None, "desk"):
-        overlay = _config(f"{scale}.yaml")
-        if overlay is None:
-            raise UserError(f"config/{scale}.yaml: no such file; allowed scales: smoke, desk, paper")
-        named.append(overlay)
+        named.append(CONFIG / f"{scale}.yaml")
     data: dict[str, Any] = {}
     for path in [*named, *files]:
         data = merge(data, read_yaml(path))
-    return validate(Settings, override(data, overrides))
+    return configured(override(data, overrides))
+
+
+def configured(data: Mapping[str, Any]) -> Settings:
+    """``data`` as the whole configuration, whose ``scale`` is true: see `check_scale`."""
+    settings = validate(Settings, data)
+    check_scale(settings)
+    return settings
 
 
 def read_yaml(path: Path | str) -> dict[str, Any]:
     """A YAML (or JSON) file that holds a mapping; an empty file is an empty one."""
     try:
-        data = yaml.safe_load(read_text(path))
-    except yaml.YAMLError as error:
-        raise UserError(f"{path}: not valid YAML: {' '.join(str(error).split())}") from error
+        data = parse(read_text(path))
+    except StrictError as error:
+        raise UserError(f"{path}: {error}") from error
     if data is not None and not isinstance(data, dict):
         raise UserError(f"{path}: must be a mapping of keys to values, is {type(data).__name__}")
     return data or {}
@@ -63,9 +68,9 @@ def override(data: Mapping[str, Any], assignments: Iterable[str]) -> dict[str, A
         if not equals or not name.strip():
             raise UserError(f"--set {assignment}: must be key=value, for example sac.minibatch=64")
         try:
-            value = yaml.safe_load(text)
-        except yaml.YAMLError as error:
-            raise UserError(f"--set {assignment}: the value is not valid YAML") from error
+            value = parse(text)
+        except StrictError as error:
+            raise UserError(f"--set {name.strip()}: {error}") from error
         for part in reversed(name.strip().split(".")):
             value = {part: value}
         merged = merge(merged, value)
@@ -80,10 +85,6 @@ def validate(model: type[Model], data: Mapping[str, Any]) -> Model:
         raise UserError(_one_line(model, data, error)) from error
     _reject_booleans(data, validated.model_dump(), "")
     return validated
-
-
-def _config(name: str) -> Path | None:
-    return next((folder / name for folder in CONFIG_FOLDERS if (folder / name).is_file()), None)
 
 
 def _one_line(model: type[BaseModel], data: Mapping[str, Any], error: ValidationError) -> str:

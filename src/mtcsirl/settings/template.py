@@ -10,7 +10,7 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
 from mtcsirl.settings.base import NOT_GIVEN
-from mtcsirl.settings.study import Settings
+from mtcsirl.settings.configuration import Settings
 
 WIDTH = 120
 HEAD = """\
@@ -58,6 +58,17 @@ def deviations(settings: BaseModel) -> list[Deviation]:
         if paper != NOT_GIVEN and _plain(value) != _plain(paper):
             found.append(Deviation(name, value, paper, _extra(field).get("unit", ""), field.description or ""))
     return found
+
+
+def fallbacks(settings: Settings) -> list[str]:
+    """What a cs-reward that the configuration does not know gets, one line per key."""
+    notes = []
+    for name in settings.cs_rewards:
+        if name not in settings.expert.cs_weight:
+            notes.append(f"{name}: has no expert.cs_weight; its experts take 1.0")
+        if f"expert_{name}" not in type(settings.gates).model_fields:
+            notes.append(f"{name}: has no gate of its own; its experts take gates.expert_velocity")
+    return notes
 
 
 def template(settings: Settings | None = None) -> str:

@@ -18,8 +18,8 @@ from mtcsirl.files.provenance import machine
 from mtcsirl.irl.discriminator import Batch
 from mtcsirl.irl.methods import METHODS
 from mtcsirl.irl.methods.base import Setup
+from mtcsirl.names import SINGLE_TASKS, TRAIN_TASKS
 from mtcsirl.settings import IrlSettings, SacSettings
-from mtcsirl.settings.study import SINGLE_TASKS, TRAIN_TASKS
 from mtcsirl.study.plan import Rates
 from mtcsirl.transitions import Transitions
 from mtcsirl.worlds.environments import make_environment

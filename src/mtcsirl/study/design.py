@@ -2,19 +2,20 @@
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
+from typing import TypeVar
 
 from mtcsirl.errors import UserError
+from mtcsirl.names import EVALUATION_TARGET
 from mtcsirl.settings import Settings
 from mtcsirl.study.ablations import ABLATIONS
 from mtcsirl.study.runs import (
-    EVALUATION_TARGET,
+    AnyRun,
     Baseline,
     Demonstrations,
     Expert,
     IrlRun,
-    Run,
+    Runs,
     Score,
-    Study,
     Transfer,
 )
 
@@ -35,19 +36,28 @@ def _irl_seed(settings: Settings, seed: int) -> int:
     return settings.irl_seeds[settings.seeds.index(seed) % len(settings.irl_seeds)]
 
 
+def _demonstrations(cs_reward: str, members: Iterable[tuple[str, int]], seed: int) -> tuple[Demonstrations, ...]:
+    return tuple(Demonstrations(Expert(cs_reward, task, target, seed)) for task, target in members)
+
+
 def _single_irl(task: str, cs_reward: str, seed: int) -> IrlRun:
-    return IrlRun("single_target", "mt_csirl", cs_reward, task, seed, ((task, EVALUATION_TARGET),))
+    """A seed is a replicate: its IRL run imitates the expert of the same seed."""
+    shown = _demonstrations(cs_reward, [(task, EVALUATION_TARGET)], seed)
+    return IrlRun("single_target", "mt_csirl", cs_reward, task, seed, shown)
 
 
 def _multi_target_irl(settings: Settings, task: str, cs_reward: str, seed: int) -> IrlRun:
-    members = tuple((task, target) for target in settings.multi_target.train_targets)
-    return IrlRun("multi_target", "mt_csirl", cs_reward, task, seed, members)
+    """One expert per target, that of the first seed: results are conditional on the experts."""
+    members = [(task, target) for target in settings.multi_target.train_targets]
+    shown = _demonstrations(cs_reward, members, settings.seeds[0])
+    return IrlRun("multi_target", "mt_csirl", cs_reward, task, seed, shown)
 
 
 def _multi_task_irl(settings: Settings, method: str, cs_reward: str, seed: int) -> IrlRun:
-    study = settings.multi_task
-    members = tuple((task, target) for task in study.train_tasks for target in study.train_targets)
-    return IrlRun("multi_task", method, cs_reward, "all", seed, members)
+    """As with a single target, each seed has experts of its own."""
+    chosen = settings.multi_task
+    members = [(task, target) for task in chosen.train_tasks for target in chosen.train_targets]
+    return IrlRun("multi_task", method, cs_reward, "all", seed, _demonstrations(cs_reward, members, seed))
 
 
 def _baselines(settings: Settings, tasks: Iterable[str]) -> Iterator[Baseline]:
@@ -60,11 +70,11 @@ def _experts(settings: Settings, tasks: Iterable[str], cs_rewards: Iterable[str]
 
 
 def _score(settings: Settings, irl: IrlRun, task: str) -> Score:
-    expert = Expert(irl.cs_reward, task, EVALUATION_TARGET, settings.seeds[0])
-    return Score(irl, task, expert, Baseline(task, EVALUATION_TARGET, settings.seeds[0]))
+    experts = tuple(Expert(irl.cs_reward, task, EVALUATION_TARGET, seed) for seed in settings.seeds)
+    return Score(irl, task, experts, tuple(Baseline(task, EVALUATION_TARGET, seed) for seed in settings.seeds))
 
 
-def _single_target_curves(settings: Settings, task: str) -> Iterator[Run]:
+def _single_target_curves(settings: Settings, task: str) -> Iterator[AnyRun]:
     """Figures 2, 4, 5: IRL agent, Transferred and SAC on the task and target of the expert."""
     if task not in settings.single_target.tasks:
         return
@@ -74,23 +84,22 @@ def _single_target_curves(settings: Settings, task: str) -> Iterator[Run]:
             yield Transfer(_single_irl(task, cs, _irl_seed(settings, seed)), task, EVALUATION_TARGET, seed)
 
 
-def _single_target_scores(settings: Settings, cs_reward: str) -> Iterator[Run]:
-    """Figures 2c and 6: the reward of one task against the truth on that task."""
-    task = settings.single_target.tasks[0]
-    if cs_reward in settings.cs_rewards:
+def _single_target_scores(settings: Settings, cs_reward: str, tasks: Iterable[str]) -> Iterator[AnyRun]:
+    """Figures 2c and 6, claim C4: the reward of one task against the truth on that task."""
+    for task in tasks if cs_reward in settings.cs_rewards else ():
         for seed in settings.irl_seeds:
             yield _score(settings, _single_irl(task, cs_reward, seed), task)
 
 
-def _multi_task_scores(settings: Settings, cs_reward: str) -> Iterator[Run]:
-    """Figures 3c and 7: the reward of several tasks against the truth on an unseen task."""
-    task = settings.multi_task.unseen_tasks[0]
+def _multi_task_scores(settings: Settings, cs_reward: str, tasks: Iterable[str]) -> Iterator[AnyRun]:
+    """Figures 3c and 7, claim C9: the reward of several tasks against the truth on unseen tasks."""
     if cs_reward in settings.cs_rewards and "mt_csirl" in settings.methods:
-        for seed in settings.irl_seeds:
-            yield _score(settings, _multi_task_irl(settings, "mt_csirl", cs_reward, seed), task)
+        for task in tasks:
+            for seed in settings.irl_seeds:
+                yield _score(settings, _multi_task_irl(settings, "mt_csirl", cs_reward, seed), task)
 
 
-def _cross_transfer(settings: Settings, cs_reward: str) -> Iterator[Run]:
+def _cross_transfer(settings: Settings, cs_reward: str) -> Iterator[AnyRun]:
     """Tables 1 and 3: the reward of each task (several targets) on the new target of every task."""
     tasks = settings.multi_target.tasks
     yield from _baselines(settings, tasks)
@@ -100,7 +109,7 @@ def _cross_transfer(settings: Settings, cs_reward: str) -> Iterator[Run]:
             yield from (Transfer(irl, task, EVALUATION_TARGET, seed) for task in tasks)
 
 
-def _unseen(settings: Settings, methods: Iterable[str], cs_rewards: Iterable[str]) -> Iterator[Run]:
+def _unseen(settings: Settings, methods: Iterable[str], cs_rewards: Iterable[str]) -> Iterator[AnyRun]:
     for method in methods:
         for cs in cs_rewards:
             for seed in settings.seeds:
@@ -109,45 +118,54 @@ def _unseen(settings: Settings, methods: Iterable[str], cs_rewards: Iterable[str
                     yield Transfer(irl, task, EVALUATION_TARGET, seed)
 
 
-def _table_2(settings: Settings) -> Iterator[Run]:
+def _table_2(settings: Settings) -> Iterator[AnyRun]:
     yield from _experts(settings, settings.multi_task.unseen_tasks, settings.cs_rewards)
     yield from _baselines(settings, settings.multi_task.unseen_tasks)
     yield from _unseen(settings, settings.methods, settings.cs_rewards)
 
 
-def _table_4(settings: Settings) -> Iterator[Run]:
+def _table_4(settings: Settings) -> Iterator[AnyRun]:
     """MT-CSIRL+LT: both learned rewards, new agents on tasks and targets that the IRL has seen."""
     if "mt_csirl_lt" not in settings.methods:
         return
-    study = settings.multi_task
+    chosen = settings.multi_task
     for cs in settings.cs_rewards:
         for seed in settings.seeds:
             irl = _multi_task_irl(settings, "mt_csirl_lt", cs, _irl_seed(settings, seed))
-            yield from (Transfer(irl, task, study.train_targets[0], seed) for task in study.train_tasks)
+            yield from (Transfer(irl, task, chosen.train_targets[0], seed) for task in chosen.train_tasks)
 
 
-def _figure_2(settings: Settings) -> Iterator[Run]:
+def _figure_2(settings: Settings) -> Iterator[AnyRun]:
     yield from _single_target_curves(settings, FIGURE_TASKS["figure_2"])
-    yield from _single_target_scores(settings, "velocity")
+    yield from _single_target_scores(settings, "velocity", settings.single_target.tasks[:1])
 
 
-def _figure_3(settings: Settings) -> Iterator[Run]:
+def _figure_3(settings: Settings) -> Iterator[AnyRun]:
     tasks = settings.multi_task.unseen_tasks
     yield from _experts(settings, tasks, settings.cs_rewards)
     yield from _baselines(settings, tasks)
     yield from _unseen(settings, [m for m in settings.methods if m == "mt_csirl"], settings.cs_rewards)
-    yield from _multi_task_scores(settings, "velocity")
+    yield from _multi_task_scores(settings, "velocity", settings.multi_task.unseen_tasks[:1])
 
 
-def _nothing(settings: Settings) -> Iterator[Run]:
+def _judged(settings: Settings) -> Iterator[AnyRun]:
+    """What the claims read beside tables and figures: correlations on every task, and C12's generators."""
+    for cs in settings.cs_rewards:
+        yield from _single_target_scores(settings, cs, settings.single_target.tasks)
+        yield from _multi_task_scores(settings, cs, settings.multi_task.unseen_tasks)
+    for variant in C12:
+        yield from (run for run in _runs(settings, *variant) if isinstance(run, IrlRun))
+
+
+def _nothing(settings: Settings) -> Iterator[AnyRun]:
     return iter(())
 
 
-def _curves_of(artefact: str) -> Callable[[Settings], Iterator[Run]]:
+def _curves_of(artefact: str) -> Callable[[Settings], Iterator[AnyRun]]:
     return lambda settings: _single_target_curves(settings, FIGURE_TASKS[artefact])
 
 
-ARTEFACTS: dict[str, Callable[[Settings], Iterator[Run]]] = {
+ARTEFACTS: dict[str, Callable[[Settings], Iterator[AnyRun]]] = {
     "table_1": lambda settings: _cross_transfer(settings, "action_norm"),
     "table_2": _table_2,
     "table_3": lambda settings: _cross_transfer(settings, "velocity"),
@@ -158,8 +176,8 @@ ARTEFACTS: dict[str, Callable[[Settings], Iterator[Run]]] = {
     "figure_3": _figure_3,
     "figure_4": _curves_of("figure_4"),
     "figure_5": _curves_of("figure_5"),
-    "figure_6": lambda settings: _single_target_scores(settings, "action_norm"),
-    "figure_7": lambda settings: _multi_task_scores(settings, "action_norm"),
+    "figure_6": lambda settings: _single_target_scores(settings, "action_norm", settings.single_target.tasks[:1]),
+    "figure_7": lambda settings: _multi_task_scores(settings, "action_norm", settings.multi_task.unseen_tasks[:1]),
     "figure_8": _nothing,
     "figure_9": _nothing,
     "figure_s1": _curves_of("figure_s1"),
@@ -168,34 +186,12 @@ ARTEFACTS: dict[str, Callable[[Settings], Iterator[Run]]] = {
 """Every artefact, numbered as in the paper, and the runs it reads (not yet what those need in turn)."""
 
 
-def _needs(settings: Settings, run: Run) -> Iterator[Run]:
-    """The runs that ``run`` reads."""
-    if isinstance(run, Transfer):
-        yield run.irl
-    elif isinstance(run, Score):
-        yield from (run.irl, run.expert, run.baseline)
-    elif isinstance(run, IrlRun):
-        for task, target in run.members:
-            expert = Expert(run.cs_reward, task, target, settings.seeds[0])
-            yield Demonstrations(run.cs_reward, task, target, expert, (run.experiment,))
-    elif isinstance(run, Demonstrations):
-        yield run.expert
+C12 = (("ablation_curriculum", "default"), ("ablation_curriculum", "constant"))
+"""The variants of an ablation whose generators claim C12 compares."""
+CLAIMS = "claims"
 
 
-def _readers(settings: Settings) -> dict[Demonstrations, tuple[str, ...]]:
-    """Which experiments read each demonstration set, over the whole study, whatever artefact was asked for."""
-    readers: dict[Demonstrations, set[str]] = {}
-    shown = [run for rule in ARTEFACTS.values() for run in rule(settings)]
-    shown += [
-        run for name, ablation in ABLATIONS.items() for v in ablation.variants for run in _runs(settings, name, v)
-    ]
-    for irl in {run.irl if isinstance(run, Transfer | Score) else run for run in shown}:
-        for demonstrations in _needs(settings, irl) if isinstance(irl, IrlRun) else ():
-            readers.setdefault(demonstrations, set()).add(irl.experiment)  # type: ignore[arg-type, union-attr]
-    return {demonstrations: tuple(sorted(names)) for demonstrations, names in readers.items()}
-
-
-def _runs(settings: Settings, ablation: str, name: str) -> Iterator[Run]:
+def _runs(settings: Settings, ablation: str, name: str) -> Iterator[AnyRun]:
     """What the variant ``name`` of ``ablation`` shows, with runs of the main study where it changes nothing."""
     chosen, variant = settings.ablations, ABLATIONS[ablation].variants[name]
     anew = ABLATIONS[ablation].agents if variant.agents is None else variant.agents
@@ -206,7 +202,7 @@ def _runs(settings: Settings, ablation: str, name: str) -> Iterator[Run]:
     for task in chosen.tasks:
         for seed in chosen.seeds:
             irl = replace(_single_irl(task, chosen.cs_reward, seed), variant=of("irl"))
-            runs: dict[str, Run] = {
+            runs: dict[str, AnyRun] = {
                 "expert": Expert(chosen.cs_reward, task, EVALUATION_TARGET, seed, of("expert")),
                 "irl": irl,
                 "transfer": Transfer(irl, task, EVALUATION_TARGET, seed, of("transfer")),
@@ -214,31 +210,42 @@ def _runs(settings: Settings, ablation: str, name: str) -> Iterator[Run]:
             yield from (runs[agent] for agent in ABLATIONS[ablation].agents)
 
 
-def variants(settings: Settings, ablation: str) -> dict[str, Study]:
+def variants(settings: Settings, ablation: str) -> dict[str, Runs]:
     """The runs that each variant of an ablation shows, by the variant's name."""
-    return {name: _study(set(_runs(settings, ablation, name)), {}) for name in ABLATIONS[ablation].variants}
+    return {name: _sorted(set(_runs(settings, ablation, name))) for name in ABLATIONS[ablation].variants}
 
 
-def design(settings: Settings, artefact: str | None = None) -> Study:
+def design(settings: Settings, artefact: str | None = None) -> Runs:
     """All runs of the study, or those that an artefact or an ablation needs; shared agents appear once."""
-    if artefact in ABLATIONS:
-        open_runs = [run for name in ABLATIONS[artefact].variants for run in _runs(settings, artefact, name)]
-    elif artefact is None or artefact in ARTEFACTS:
-        open_runs = [run for name in ([artefact] if artefact else ARTEFACTS) for run in ARTEFACTS[name](settings)]
-    else:
-        raise UserError(f"unknown artefact {artefact!r}; allowed: {', '.join((*ARTEFACTS, *ABLATIONS))}")
-    found: set[Run] = set()
-    while open_runs:
-        run = open_runs.pop()
+    found: set[AnyRun] = set()
+    left = list(_shown(settings, artefact))
+    while left:
+        run = left.pop()
         if run not in found:
             found.add(run)
-            open_runs.extend(_needs(settings, run))
-    return _study(found, _readers(settings))
+            left.extend(run.needs.values())
+    return _sorted(found)
 
 
-def _study(found: set[Run], readers: dict[Demonstrations, tuple[str, ...]]) -> Study:
-    def of(kind: type) -> tuple:
+def _shown(settings: Settings, artefact: str | None) -> Iterator[AnyRun]:
+    """The runs whose results ``artefact`` shows, not yet what those need in turn."""
+    if artefact in ABLATIONS:
+        for name in ABLATIONS[artefact].variants:
+            yield from _runs(settings, artefact, name)
+    elif artefact in ARTEFACTS:
+        yield from ARTEFACTS[artefact](settings)
+    elif artefact in (None, CLAIMS):
+        for runs in (*ARTEFACTS.values(), _judged):
+            yield from runs(settings)
+    else:
+        raise UserError(f"unknown artefact {artefact!r}; allowed: {', '.join((*ARTEFACTS, CLAIMS, *ABLATIONS))}")
+
+
+Kind = TypeVar("Kind", bound=AnyRun)
+
+
+def _sorted(found: set[AnyRun]) -> Runs:
+    def of(kind: type[Kind]) -> tuple[Kind, ...]:
         return tuple(sorted(run for run in found if isinstance(run, kind)))
 
-    demonstrations = tuple(replace(run, experiments=readers[run]) for run in of(Demonstrations))
-    return Study(of(Expert), of(Baseline), demonstrations, of(IrlRun), of(Transfer), of(Score))
+    return Runs(of(Expert), of(Baseline), of(Demonstrations), of(IrlRun), of(Transfer), of(Score))

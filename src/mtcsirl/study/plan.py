@@ -2,22 +2,22 @@
 
 ``study/calibration.json`` holds the rates of one machine; ``mtcsirl calibrate`` measures another one. The model is the
 sum of what a job does: start-up, environment steps, gradient steps, trial and final episodes. A test holds its parts
-against each other; the README says how far it was from a real run.
+against each other; the start page of a finished study gives the cost as measured.
 """
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import singledispatch
 from pathlib import Path
 
 import numpy as np
-from pydantic import BaseModel
 
 from mtcsirl.files.storage import read_json
 from mtcsirl.settings import EvaluationSettings, Settings
 from mtcsirl.settings.base import Frozen
 from mtcsirl.settings.loading import validate
-from mtcsirl.settings.runs import AgentRunSettings, DemonstrationRunSettings, IrlRunSettings, ScoreRunSettings
-from mtcsirl.study.runs import IrlRun, Run, Study
+from mtcsirl.settings.runs import AgentRunSettings, IrlRunSettings
+from mtcsirl.study.runs import AgentRun, AnyRun, Baseline, Demonstrations, Expert, IrlRun, Runs, Score, Transfer
 
 CALIBRATION = Path(__file__).with_name("calibration.json")
 BYTES_PER_TRANSITION = 4 * (39 + 4 + 39 + 1)
@@ -68,22 +68,37 @@ def load_rates(path: Path | str = CALIBRATION) -> Rates:
     return validate(Rates, read_json(path))
 
 
-def cost(run: Run, settings: Settings, rates: Rates) -> Cost:
+@singledispatch
+def cost(run: AnyRun, settings: Settings, rates: Rates) -> Cost:
     """What one run takes."""
-    own: BaseModel = run.settings(settings)
-    if isinstance(run, IrlRun) and isinstance(own, IrlRunSettings):
-        return _irl(own, [task for task, _ in run.members], rates)
-    task: str = run.task  # type: ignore[union-attr]
-    if isinstance(own, AgentRunSettings):
-        return _agent(own, task, rates)
-    if isinstance(own, DemonstrationRunSettings):
-        steps = own.episodes * own.episode_steps
-        memory = rates.base_memory_mib + steps * 4 * BYTES_PER_TRANSITION / 2**20
-        return Cost(rates.start_up + steps * rates.step(task), memory, steps * BYTES_PER_TRANSITION / 2**20)
-    if isinstance(own, ScoreRunSettings):
-        seconds = rates.start_up + SCORE_SETS * own.score.transitions * rates.step(task)
-        return Cost(seconds + own.score.bootstrap * rates.bootstrap, rates.base_memory_mib, 1.0)
     raise TypeError(f"no cost model for {run.stage}")
+
+
+@cost.register(Expert)
+@cost.register(Baseline)
+@cost.register(Transfer)
+def _of_agent(run: AgentRun, settings: Settings, rates: Rates) -> Cost:
+    return _agent(run.settings(settings), run.task, rates)
+
+
+@cost.register
+def _of_demonstrations(run: Demonstrations, settings: Settings, rates: Rates) -> Cost:
+    own = run.settings(settings)
+    steps = own.episodes * own.episode_steps
+    memory = rates.base_memory_mib + steps * 4 * BYTES_PER_TRANSITION / 2**20
+    return Cost(rates.start_up + steps * rates.step(run.task), memory, steps * BYTES_PER_TRANSITION / 2**20)
+
+
+@cost.register
+def _of_irl(run: IrlRun, settings: Settings, rates: Rates) -> Cost:
+    return _irl(run.settings(settings), [task for task, _ in run.members], rates)
+
+
+@cost.register
+def _of_score(run: Score, settings: Settings, rates: Rates) -> Cost:
+    score = run.settings(settings).score
+    seconds = rates.start_up + SCORE_SETS * score.transitions * rates.step(run.task)
+    return Cost(seconds + score.bootstrap * rates.bootstrap, rates.base_memory_mib, 1.0)
 
 
 def _agent(own: AgentRunSettings, task: str, rates: Rates) -> Cost:
@@ -127,7 +142,7 @@ class StagePlan:
     disk_gib: float
 
 
-def plan(study: Study, settings: Settings, rates: Rates) -> list[StagePlan]:
+def plan(study: Runs, settings: Settings, rates: Rates) -> list[StagePlan]:
     """One line per stage, in the DAG's order; core-hours are of cores that are all busy."""
     costs: dict[str, list[Cost]] = {}
     for run in study:

@@ -9,42 +9,47 @@ from mtcsirl.files import storage
 from mtcsirl.settings import Settings
 from mtcsirl.study.outputs import OUTPUTS
 from mtcsirl.study.plan import Rates, cost
-from mtcsirl.study.runs import Run, Study
+from mtcsirl.study.runs import AnyRun, Runs, identity_of
+from mtcsirl.study.standing import DONE, INCOMPLETE, STALE, standing
 
-DONE, OUTDATED, RUNNING, FAILED, WAITING = STATES = ("done", "outdated", "running", "failed", "waiting")
-"""Outdated: made with other settings than today's. Failed: was started, does not run and left no complete result."""
+RUNNING, FAILED, WAITING = "running", "failed", "waiting"
+STATES = (DONE, STALE, RUNNING, FAILED, WAITING)
+"""Stale: its number could differ today. Failed: was started, does not run and left no complete result."""
 STARTING_SECONDS = 15
 """A log this young without a lock is a job that still imports its libraries."""
 
 
 @dataclass(frozen=True)
 class RunStatus:
-    """One run: its state, its gate (None: not done, or has none), the seconds it took, the last line of its log."""
+    """One run: its state, its gate (None: not done, or has none), the seconds it took, what there is to say of it."""
 
-    run: Run
+    run: AnyRun
     state: str
     passed: bool | None = None
     seconds: float | None = None
     says: str = ""
 
 
-def study_status(study: Study, settings: Settings) -> list[RunStatus]:
+def study_status(study: Runs, settings: Settings) -> list[RunStatus]:
     """The status of every run of ``study``, in the DAG's order."""
     return [run_status(run, settings) for run in study]
 
 
-def run_status(run: Run, settings: Settings) -> RunStatus:
+def run_status(run: AnyRun, settings: Settings) -> RunStatus:
     """Look into the folder of ``run`` and its log."""
-    folder = Path(settings.results) / run.folder
-    log = Path(settings.results) / "logs" / f"{run.folder}.log"
-    if storage.is_locked(folder):
+    results = Path(settings.results)
+    log = results / "logs" / run.folder / f"{identity_of(run, settings).hash}.log"
+    if storage.is_locked(results / run.folder):
         return RunStatus(run, RUNNING, says=_last_line(log))
-    if all((folder / name).is_file() for name in OUTPUTS[run.stage]):
-        return _finished(run, settings, folder)
-    if not log.is_file():
-        return RunStatus(run, WAITING)
-    starting = time.time() - log.stat().st_mtime < STARTING_SECONDS
-    return RunStatus(run, RUNNING if starting else FAILED, says=_last_line(log))
+    found = standing(run, settings)
+    if found.state == DONE:
+        return _finished(run, results / run.folder)
+    if found.state == INCOMPLETE:
+        return RunStatus(run, FAILED, says="; ".join(found.why))
+    if log.is_file():
+        starting = time.time() - log.stat().st_mtime < STARTING_SECONDS
+        return RunStatus(run, RUNNING if starting else FAILED, says=_last_line(log))
+    return RunStatus(run, STALE if found.state == STALE else WAITING, says="; ".join(found.why))
 
 
 def seconds_left(statuses: list[RunStatus], settings: Settings, rates: Rates, cores: int) -> float:
@@ -61,14 +66,13 @@ def seconds_left(statuses: list[RunStatus], settings: Settings, rates: Rates, co
     return total / cores
 
 
-def _finished(run: Run, settings: Settings, folder: Path) -> RunStatus:
+def _finished(run: AnyRun, folder: Path) -> RunStatus:
     try:
-        same = storage.read_json(folder / "settings.json") == run.settings(settings).model_dump(mode="json")
-        seconds = storage.read_json(folder / "provenance.json")["cost"]["wall_seconds"]
+        seconds = float(storage.read_json(folder / "provenance.json")["cost"]["wall_seconds"])
         gate = storage.read_json(folder / "gate.json") if "gate.json" in OUTPUTS[run.stage] else {}
-    except (UserError, KeyError, TypeError) as error:
+        return RunStatus(run, DONE, gate.get("passed"), seconds)
+    except (UserError, KeyError, TypeError, ValueError, AttributeError) as error:
         return RunStatus(run, FAILED, says=str(error))
-    return RunStatus(run, DONE if same else OUTDATED, gate.get("passed"), seconds)
 
 
 def _last_line(log: Path) -> str:

@@ -6,7 +6,7 @@ from matplotlib.figure import Figure
 
 from mtcsirl.figures.style import INK, LOOKS, TARGET_COLOUR, TEXT_WIDTH, new_figure, panel_title, styled
 from mtcsirl.validation.point_mass import SPEED_TARGET
-from mtcsirl.validation.study import Findings
+from mtcsirl.validation.recovery import Findings
 
 _LEARNED = {"four goals": (LOOKS["mt_csirl"].colour, "o"), "one goal": ("#D55E00", "D")}
 _CONTROL = ("#666666", "x")

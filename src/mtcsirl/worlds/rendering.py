@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mtcsirl.errors import UserError
+from mtcsirl.worlds.variables import backend, check_platform
 
 Image = NDArray[np.uint8]
 CAMERA = "corner2"
@@ -58,10 +59,11 @@ class SceneRenderer:
     """
 
     def __init__(self, model: Any, *, width: int, height: int, fast: bool = False) -> None:
+        drawn_by = backend(os.environ)
         import mujoco
 
         self._model, self._mujoco = model, mujoco
-        self._gl = _context(width, height)
+        self._gl = _context(drawn_by, width, height)
         self._gl.make_current()
         model.vis.global_.offwidth = max(width, model.vis.global_.offwidth)
         model.vis.global_.offheight = max(height, model.vis.global_.offheight)
@@ -70,7 +72,10 @@ class SceneRenderer:
         self._scene = mujoco.MjvScene(model, maxgeom=10_000)
         for flag in (mujoco.mjtRndFlag.mjRND_SHADOW, mujoco.mjtRndFlag.mjRND_REFLECTION):
             self._scene.flags[flag] = not fast
-        self._context = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_150.value)
+        try:
+            self._context = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_150.value)
+        except mujoco.FatalError as error:
+            raise UserError(_no_context(drawn_by, "it gave no OpenGL context")) from error
         mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN.value, self._context)
         self._viewport = mujoco.MjrRect(0, 0, width, height)
 
@@ -117,18 +122,22 @@ def _upside_down(axes: NDArray[np.float64]) -> bool:
     return bool(axes[2, 1] < 0)
 
 
-def _context(width: int, height: int) -> Any:
-    """An off-screen OpenGL context of the back end that ``MUJOCO_GL`` names; OSMesa by default."""
-    backend = os.environ.get("MUJOCO_GL", "").lower() or "osmesa"
+def _context(drawn_by: str, width: int, height: int) -> Any:
+    """An off-screen OpenGL context of a back end."""
+    check_platform(drawn_by, os.environ)
     try:
-        if backend == "egl":
+        if drawn_by == "egl":
             from mujoco.egl import GLContext
-        elif backend in ("glfw", "glx", "on", "1"):
+        elif drawn_by == "glfw":
             from mujoco.glfw import GLContext
         else:
             from mujoco.osmesa import GLContext
         return GLContext(width, height)
     except (ImportError, AttributeError, OSError, RuntimeError, TypeError) as error:
-        if backend == "osmesa":
-            raise UserError(MISSING_OSMESA) from error
-        raise UserError(f"MUJOCO_GL={backend}: no off-screen context ({error}); try MUJOCO_GL=osmesa") from error
+        raise UserError(MISSING_OSMESA if drawn_by == "osmesa" else _no_context(drawn_by, str(error))) from error
+
+
+def _no_context(drawn_by: str, why: str) -> str:
+    named = os.environ.get("MUJOCO_GL", "")
+    display = " and needs a display" if drawn_by == "glfw" else ""
+    return f"MUJOCO_GL={named}: draws by {drawn_by}{display}, but {why}; unset it: OSMesa needs neither display nor GPU"

@@ -1,35 +1,18 @@
-"""The registry of IRL methods: name -> what builds it. A new method is one file here and one name below.
+"""The IRL methods, a file each: the function ``<name>`` of ``<name>.py`` here, its name in ``names.py``.
 
-The file ``<name>.py`` holds a function ``<name>``; it is imported when the method is built, so that a configuration can
-be checked against this registry without torch.
+A file is imported when its method is built.
 """
 
-from __future__ import annotations
-
-from collections.abc import Callable
 from importlib import import_module
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from mtcsirl.irl.discriminator import Method
-    from mtcsirl.irl.methods.base import Setup
+from mtcsirl import names
+from mtcsirl.extensions import METHODS, Builder
 
-
-def _builder(name: str) -> Callable[[Setup], Method]:
-    def build(setup: Setup) -> Method:
-        method: Method = getattr(import_module(f"mtcsirl.irl.methods.{name}"), name)(setup)
-        return method
-
-    return build
+__all__ = ["METHODS"]
 
 
-METHODS: dict[str, Callable[[Setup], Method]] = {
-    name: _builder(name)
-    for name in (
-        "mt_airl",
-        "mt_vairl",
-        "mt_vairl_gp",
-        "mt_csirl",
-        "mt_csirl_lt",
-    )
-}
+def _builder(name: str) -> Builder:
+    return lambda setup: getattr(import_module(f"mtcsirl.irl.methods.{name}"), name)(setup)
+
+
+METHODS.update({name: _builder(name) for name in names.METHODS})

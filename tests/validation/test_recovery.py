@@ -5,13 +5,13 @@ import pandas as pd
 import pytest
 
 from mtcsirl.validation.figure import caption, draw
-from mtcsirl.validation.study import Findings, validate
-from mtcsirl.validation.study import shrunk as shrunk_settings
+from mtcsirl.validation.recovery import Findings, recover
+from mtcsirl.validation.recovery import shrunk as shrunk_settings
 
 
 @pytest.fixture(scope="module")
 def findings() -> Findings:
-    return validate(shrunk_settings())
+    return recover(shrunk_settings())
 
 
 def _agents(findings: Findings, metric: str) -> pd.Series:

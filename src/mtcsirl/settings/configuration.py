@@ -5,13 +5,22 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, Field, model_validator
 
+from mtcsirl.extensions import METHODS as METHOD_REGISTRY
 from mtcsirl.extensions import load_extensions
-from mtcsirl.irl.methods import METHODS as METHOD_REGISTRY
-from mtcsirl.names import TARGETS_PER_TASK
+from mtcsirl.names import (
+    CS_REWARDS,
+    EVALUATION_TARGET,
+    HIGHEST_SEED,
+    METHODS,
+    SINGLE_TASKS,
+    TARGETS_PER_TASK,
+    TRAIN_TASKS,
+    UNSEEN_TASKS,
+)
 from mtcsirl.rewards.ground_truth import COMMON_SENSE_REWARDS
 from mtcsirl.settings.base import Frozen, key
 from mtcsirl.settings.budgets import Budget, Iterations, Shares, Task
-from mtcsirl.settings.irl import IrlAlgorithmSettings, ScoreSettings, TransferSettings
+from mtcsirl.settings.irl import GeneratorSettings, IrlUpdateSettings, ScoreSettings, TransferSettings
 from mtcsirl.settings.learner import (
     EnvironmentSettings,
     EvaluationSettings,
@@ -20,14 +29,7 @@ from mtcsirl.settings.learner import (
     ProgressSettings,
     RewardScaleSettings,
 )
-
-SINGLE_TASKS = ("reach-wall", "button-press-topdown-wall", "drawer-close", "push-back", "coffee-button")
-TRAIN_TASKS = ("window-open", "reach", "plate-slide", "faucet-open", "coffee-button", "door-close")
-DESIGN_TASKS = tuple(dict.fromkeys(SINGLE_TASKS + TRAIN_TASKS))
-"""The ten tasks of the paper."""
-UNSEEN_TASKS = ("reach-wall", "button-press-topdown-wall", "drawer-close", "push-back")
-METHODS = ("mt_airl", "mt_vairl", "mt_vairl_gp", "mt_csirl", "mt_csirl_lt")
-CS_REWARDS = ("velocity", "action_norm")
+from mtcsirl.settings.paths import Folder, PathText
 
 
 def _known_method(name: str) -> str:
@@ -55,7 +57,7 @@ Target = Annotated[int, Field(ge=0, lt=TARGETS_PER_TASK)]
 Method = Annotated[str, AfterValidator(_known_method)]
 CsReward = Annotated[str, AfterValidator(_known_cs_reward)]
 Targets = Annotated[tuple[Target, ...], Field(min_length=1), AfterValidator(_unique)]
-Seed = Annotated[int, Field(ge=0)]
+Seed = Annotated[int, Field(ge=0, le=HIGHEST_SEED)]
 Seeds = Annotated[tuple[Seed, ...], Field(min_length=1), AfterValidator(_unique)]
 EXPERT_STEPS = {
     "default": 40_000,
@@ -105,6 +107,14 @@ class MultiTargetSettings(Frozen):
 
     tasks: Tasks = key(SINGLE_TASKS, "rows and columns of Tables 1 and 3", paper=SINGLE_TASKS)
     train_targets: Targets = key((1, 2, 3), "targets with experts; T = their number", paper=(1, 2, 3, 4, 5))
+
+    @model_validator(mode="after")
+    def _really_new(self) -> "MultiTargetSettings":
+        if EVALUATION_TARGET in self.train_targets:
+            raise ValueError(
+                f"train_targets holds {EVALUATION_TARGET}, the new target that Tables 1 and 3 are read on; take it out"
+            )
+        return self
 
 
 class MultiTaskSettings(Frozen):
@@ -177,6 +187,8 @@ class ExpertSettings(RewardScaleSettings):
     curriculum: bool = key(
         True, "weight the ground-truth cs-reward by r_ave / R_MAX, as section 3.3 does for f", paper=False
     )
+    curriculum_window: int = key(256, "window of r_ave", unit="environment steps", gt=0)
+    curriculum_maximum: float = key(10.0, "R_MAX of the curriculum: 10 is the most that a task pays", gt=0, le=10)
 
 
 class BaselineSettings(RewardScaleSettings):
@@ -201,7 +213,7 @@ class DemonstrationSettings(Frozen):
     )
 
 
-class IrlStudySettings(IrlAlgorithmSettings):
+class IrlStudySettings(IrlUpdateSettings, GeneratorSettings):
     """Inverse reinforcement learning."""
 
     warm_up_iterations: Iterations = key(
@@ -236,11 +248,12 @@ class Settings(Frozen):
     """The whole configuration; the defaults are the desk scale."""
 
     scale: Literal["smoke", "desk", "paper"] = key(
-        "desk", "smoke: numbers mean nothing; desk: 24 hours on two cores; paper: the paper's numbers"
+        "desk",
+        "smoke: numbers mean nothing; desk: shrunk until two cores do it; paper: every number that the paper gives",
     )
-    results: str = key("results", "folder of all runs, tables and the report", min_length=1)
-    figures: str = key("paper_figs", "folder of all figures", min_length=1)
-    extensions: tuple[str, ...] = key((), "Python files with methods and common-sense rewards of one's own")
+    results: Folder = key("results", "folder of all runs, tables and the report")
+    figures: Folder = key("paper_figs", "folder of all figures")
+    extensions: tuple[PathText, ...] = key((), "Python files with methods and common-sense rewards of one's own")
     seeds: Seeds = key(
         (0, 1, 2, 3, 4), "seeds of every reported agent; development uses 100 and up", paper=(0, 1, 2, 3, 4)
     )

@@ -17,7 +17,7 @@ from mtcsirl.irl.rollout import World
 from mtcsirl.irl.trainer import IrlTrainer
 from mtcsirl.results.correlation import pearson, remove
 from mtcsirl.rewards.networks import RewardNetwork
-from mtcsirl.settings import DiscriminatorSettings, EvaluationSettings, IrlSettings, LearnerSettings
+from mtcsirl.settings import DiscriminatorSettings, EvaluationSettings, GeneratorSettings, IrlSettings, LearnerSettings
 from mtcsirl.settings.runs import IrlRunSettings
 from mtcsirl.transitions import RewardFunction, Transitions
 from mtcsirl.validation.agents import demonstrate, roll_out, sampled, train_agents
@@ -66,8 +66,6 @@ class ValidationSettings:
             generator_updates=100,
             generator_replay=10,
             curriculum=False,
-            temperature=1.0,
-            reward_scale=1.0,
             discriminator=DiscriminatorSettings(
                 hidden_sizes=(64, 64),
                 learning_rate=self.learning_rate,
@@ -86,7 +84,8 @@ class ValidationSettings:
             random_steps=400,
         )
         evaluation = EvaluationSettings(episodes=1, episode_steps=EPISODE_STEPS)
-        return IrlRunSettings(sac=irl.scaling().sac(learner), irl=irl, evaluation=evaluation)
+        sac = GeneratorSettings(temperature=1.0, reward_scale=1.0).scaling().sac(learner)
+        return IrlRunSettings(sac=sac, irl=irl, evaluation=evaluation)
 
 
 class Findings(NamedTuple):
@@ -100,7 +99,7 @@ class Findings(NamedTuple):
     """reward, seed, task, target, step, metric, value of the generators and discriminators."""
 
 
-def validate(settings: ValidationSettings, processes: int = 1) -> Findings:
+def recover(settings: ValidationSettings, processes: int = 1) -> Findings:
     """Run the study: per seed MT-CSIRL on four goals and on one, controls, and new agents on the unseen goal."""
     if processes <= 1:
         parts = [_one_seed(settings, seed) for seed in settings.seeds]

@@ -1,0 +1,67 @@
+"""How a run of the study stands: absent, incomplete, stale (and why) or done. One answer for everyone who asks."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+from mtcsirl.errors import UserError
+from mtcsirl.files.identity import Record, differences, lost, read_record, write_marker
+from mtcsirl.settings import Settings
+from mtcsirl.study.runs import AnyRun, identity_of
+
+ABSENT, INCOMPLETE, STALE, DONE = "absent", "incomplete", "stale", "done"
+
+
+@dataclass(frozen=True)
+class Standing:
+    """The state of a run's folder and, where it is not done, why; one line each."""
+
+    state: str
+    why: tuple[str, ...] = ()
+    record: Record | None = None
+
+
+def standing(run: AnyRun, settings: Settings, results: Path | str | None = None) -> Standing:
+    """Hold the record in the folder of ``run`` against what ``settings`` and today's code ask for."""
+    results = Path(settings.results if results is None else results)
+    folder = results / run.folder
+    try:
+        record = read_record(folder)
+    except UserError as error:
+        return Standing(INCOMPLETE, (str(error),))
+    if record is None:
+        return Standing(ABSENT)
+    wanted = identity_of(run, settings)
+    if record.identity.hash != wanted.hash:
+        return Standing(STALE, tuple(differences(record.identity, wanted)), record)
+    missing = lost(folder, record)
+    if missing:
+        return Standing(INCOMPLETE, (f"lost {', '.join(missing)}",), record)
+    return _over_its_inputs(run, record, results)
+
+
+def _over_its_inputs(run: AnyRun, record: Record, results: Path) -> Standing:
+    """A run of the same identity may have been made again elsewhere, with other bytes."""
+    for role, needed in run.needs.items():
+        try:
+            other = read_record(results / needed.folder)
+        except UserError:
+            continue
+        if other is not None and role in record.read and record.read[role] != other.bytes:
+            return Standing(STALE, (f"input {role}: made again with other bytes",), record)
+    return Standing(DONE, (), record)
+
+
+def settle(runs: Iterable[AnyRun], settings: Settings) -> dict[str, str]:
+    """Leave in every folder the marker of what stands there; returns the hash that each run must have, by folder.
+
+    Markers are a workflow's view: rewritten from the records each time it is read, whatever happened in between.
+    """
+    wanted: dict[str, str] = {}
+    for run in runs:
+        wanted[run.folder] = identity_of(run, settings).hash
+        folder = Path(settings.results) / run.folder
+        if folder.is_dir():
+            done = standing(run, settings).state == DONE
+            write_marker(folder, wanted[run.folder] if done else None)
+    return wanted

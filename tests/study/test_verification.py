@@ -1,0 +1,67 @@
+"""A results folder is checked file by file."""
+
+from pathlib import Path
+
+import pytest
+
+from mtcsirl import cli
+from mtcsirl.files import storage
+from mtcsirl.files.identity import FILE, Identity, Record, checksums, dumps, result_files
+from mtcsirl.study.verification import faults
+
+
+@pytest.fixture
+def results(tmp_path: Path) -> Path:
+    """Two runs, signed."""
+    for seed in (0, 1):
+        folder = tmp_path / f"sac/reach-t0/s{seed}"
+        for name in ("curve.csv", "settings.json", "policies/reach.json", "provenance.json"):
+            storage.write_text(folder / name, f"{name} {seed}")
+        identity = Identity("train_sac", {"seed": seed}, {}, {}, {})
+        storage.write_text(folder / FILE, dumps(Record(identity, checksums(folder, result_files(folder)))))
+    return tmp_path
+
+
+def test_a_whole_study_has_no_fault(results: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert not list(faults(results))
+    assert cli.main(["verify", str(results)]) == 0
+    assert "every file is what its run wrote" in capsys.readouterr().out
+
+
+def _flip(path: Path) -> None:
+    content = bytearray(path.read_bytes())
+    content[-1] ^= 1
+    path.write_bytes(content)
+
+
+DAMAGE = {
+    "a flipped bit": (lambda folder: _flip(folder / "curve.csv"), "curve.csv changed since its run wrote it"),
+    "a flipped bit further down": (lambda folder: _flip(folder / "policies/reach.json"), "policies/reach.json changed"),
+    "a lost file": (lambda folder: (folder / "curve.csv").unlink(), "lost curve.csv"),
+    "a truncated record": (lambda folder: storage.write_text(folder / FILE, "{"), "not a readable identity"),
+    "an edited record": (
+        lambda folder: storage.write_text(folder / FILE, (folder / FILE).read_text().replace('"seed":0', '"seed":7')),
+        "does not fit its own hash",
+    ),
+    "a foreign file": (lambda folder: storage.write_text(folder / "own.csv", "x"), "no file of its run"),
+    "no record": (lambda folder: (folder / FILE).unlink(), "without identity.json"),
+    "a dead writer's file": (lambda folder: (folder / ".curve.csv.12.tmp").touch(), "left by a writer"),
+}
+
+
+@pytest.mark.parametrize("what", DAMAGE)
+def test_what_is_wrong_is_named(results: Path, capsys: pytest.CaptureFixture[str], what: str) -> None:
+    damage, said = DAMAGE[what]
+    damage(results / "sac/reach-t0/s0")
+    (found,) = faults(results)
+    assert said in found.why
+    assert "s0" in str(found.path)
+    assert cli.main(["verify", str(results)]) == 2
+    printed = capsys.readouterr()
+    assert printed.out.startswith("delete ")
+    assert printed.err.count("\n") == 1
+
+
+def test_no_such_folder_is_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["verify", str(tmp_path / "none")]) == 2
+    assert capsys.readouterr().err.count("\n") == 1
