@@ -43,8 +43,8 @@ def test_every_variant_task_and_seed_has_its_mark(ablation: str) -> None:
 
 def test_the_caption_counts_seeds_and_agents_below_their_gate() -> None:
     text = caption("ablation_observation", _rows("ablation_observation"), SETTINGS)
-    assert "n = 2" in text
-    assert "Below their gate: 4 agents" in text
+    assert f"n = {len(SETTINGS.ablations.seeds)}" in text
+    assert f"Below their gate: {2 * len(SETTINGS.ablations.seeds)} agents" in text
 
 
 def test_nothing_yet_is_said_in_every_panel() -> None:

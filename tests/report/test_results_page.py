@@ -1,21 +1,23 @@
+import numpy as np
 import pytest
+from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 
 from mtcsirl.claims.claims import judge, load_criteria
 from mtcsirl.cli import main
-from mtcsirl.figures.claims import claims_figure, limits_of
+from mtcsirl.figures.claims import VERDICT_COLOURS, caption, claims_figure
 from mtcsirl.files.storage import read_json, read_text, write_json
 from mtcsirl.report.results_page import results_page
 from mtcsirl.results.rows import evaluation_rows
 from mtcsirl.settings import Settings
 from mtcsirl.study.design import design
 from mtcsirl.tables import TABLES
-from tests.claims.made_up import SETTINGS, as_the_paper_says, evaluation, rows_of, scores
+from tests.claims.made_up import SETTINGS, as_the_paper_says, evaluation, judge_all, rows_of, scores
 
 
 @pytest.fixture(scope="module")
 def findings():
-    return judge(rows_of(as_the_paper_says), scores(), SETTINGS)
+    return judge_all()
 
 
 def texts(figure):
@@ -27,29 +29,50 @@ def test_figure_has_a_row_and_a_verdict_per_claim(findings):
     assert isinstance(figure, Figure)
     found = texts(figure)
     assert [text for text in found if text in load_criteria()["claims"]] == list(load_criteria()["claims"])
-    assert found.count("reproduced") == 12
-    drawn = figure.axes[0].lines
+    assert [found.count(verdict) for verdict in ("reproduced", "reproduced (gate)")] == [11, 2]
+    sentences = [" ".join(text.split()) for text in found]
+    assert all(finding.text in sentences for finding in findings), "whole sentences"
+    drawn = figure.axes[1].lines
     assert len([line for line in drawn if line.get_marker() == "o"]) == len(findings[0].units)
+    assert "Preconditions, settings and the reading of each claim were not" in caption()
+
+
+def test_figure_fits_a_page_and_its_text_is_no_small_print(findings):
+    figure = claims_figure(findings, SETTINGS)
+    width, height = figure.get_size_inches()
+    assert width <= 5.5
+    assert height <= 9.5
+    sizes = [text.get_fontsize() for axes in figure.axes for text in (*axes.texts, *axes.get_yticklabels())]
+    assert min(sizes) >= 6
+
+
+def test_verdicts_differ_in_colour_and_can_be_read_on_white():
+    assert len(set(VERDICT_COLOURS.values())) == len(VERDICT_COLOURS)
+    for colour in VERDICT_COLOURS.values():
+        channels = np.array(to_rgb(colour))
+        linear = np.where(channels <= 0.04045, channels / 12.92, ((channels + 0.055) / 1.055) ** 2.4)
+        assert 1.05 / (linear @ [0.2126, 0.7152, 0.0722] + 0.05) > 4.5, colour
 
 
 def test_figure_shows_each_units_limit_and_the_papers_number(findings):
-    left = {f.name: axes for f, axes in zip(findings, claims_figure(findings, SETTINGS).axes[::2], strict=True)}
-    units = {f.name: f.units for f in findings}
+    right = {f.name: axes for f, axes in zip(findings, claims_figure(findings, SETTINGS).axes[1::2], strict=True)}
+    units = {f.name: [unit for unit in f.units if unit.state != "not judged"] for f in findings}
     for name in ("C1", "C7"):
-        black = [line for line in left[name].lines if line.get_color() == "black"]
+        black = [line for line in right[name].lines if line.get_color() == "black"]
         assert len(black) == len(units[name])
-        triangles = [line.get_xdata()[0] for line in left[name].lines if line.get_marker() == "v"]
+        triangles = [line.get_xdata()[0] for line in right[name].lines if line.get_marker() == "v"]
         assert triangles == [unit.paper_value for unit in units[name]]
-    limits = [line.get_xdata()[0] for line in left["C1"].lines if line.get_color() == "black"]
+    limits = [line.get_xdata()[0] for line in right["C1"].lines if line.get_color() == "black"]
     assert limits == [0.05] * 4 + [0.15] * 4, "action norm above velocity"
-    assert not [line for line in left["C2"].lines if line.get_marker() == "v"], "the paper prints no number"
+    assert not [line for line in right["C2"].lines if line.get_marker() == "v"], "the paper prints no number"
 
 
 def test_nothing_of_the_figure_is_cut_off(findings):
     figure = claims_figure(findings, SETTINGS)
     figure.canvas.draw()
     for axes in figure.axes:
-        for text in (*axes.texts, axes.xaxis.label, *axes.get_yticklabels()):
+        ticks = axes.get_yticklabels() if axes.axison else ()
+        for text in (*axes.texts, axes.xaxis.label, *ticks):
             box = text.get_window_extent()
             if text.get_text():
                 assert figure.bbox.x0 - 1 <= box.x0, text
@@ -59,16 +82,17 @@ def test_nothing_of_the_figure_is_cut_off(findings):
 def test_figure_of_nothing_and_of_smoke_says_so():
     nothing = judge(rows_of(as_the_paper_says).iloc[:0], scores().iloc[:0], SETTINGS)
     smoke = claims_figure(nothing, SETTINGS.model_copy(update={"scale": "smoke"}))
-    assert texts(smoke).count("not run") == 12
+    assert [texts(smoke).count(text) for text in ("not run", "not run (gate)")] == [11, 2]
     assert "smoke scale" in smoke.get_supxlabel()
 
 
-def test_limits_are_those_of_the_criteria(findings):
-    rules = load_criteria()["claims"]
-    drawn = {f.name: {limit for unit in f.units for limit in limits_of(rules[f.name], unit)} for f in findings}
-    assert drawn["C1"] == {0.05, 0.15}
-    assert drawn["C3"] == {-0.25, 0.25}
-    assert drawn["C7"] == {0.5}
+def test_the_shaded_region_is_that_of_the_criterion(findings):
+    holds = {f.name: {tuple(unit.holds) for unit in f.units} for f in findings}
+    assert holds["C1"] == {(-np.inf, 0.05), (-np.inf, 0.15)}
+    assert holds["C3"] == {(-0.25, 0.25)}
+    assert holds["C7"] == {(0.5, np.inf)}
+    assert holds["C6"] == {(-np.inf, 0.25)}
+    assert all(low < high for regions in holds.values() for low, high in regions)
 
 
 def test_page_has_verdicts_tables_and_deviations_once(findings):
@@ -76,7 +100,7 @@ def test_page_has_verdicts_tables_and_deviations_once(findings):
     tables = {name: TABLES[name](frame, SETTINGS) for name, frame in rows.items()}
     page = results_page(findings, tables, SETTINGS, provenance={"commit": "abc"})
     assert page.count(f"sac.minibatch = {SETTINGS.sac.minibatch}") == 1
-    assert all(f"### {title}" in page for title in ("Table 2", "Table 4", "C1: reproduced"))
+    assert all(f"### {title}" in page for title in ("Table 2", "Table 4", "C1 (gate): reproduced"))
     assert "| commit | abc |" in page
     assert "Not run yet" not in page
     assert "No run yet" not in page
@@ -102,7 +126,7 @@ def test_page_of_a_part_shows_that_part(findings):
     """A claim that was judged keeps its numbers beside those that were not."""
     nothing = judge(rows_of(as_the_paper_says).iloc[:0], scores().iloc[:0], SETTINGS)
     page = results_page([findings[0], *nothing[1:]], {}, SETTINGS)
-    assert "### C1: reproduced" in page
+    assert "### C1 (gate): reproduced" in page
     assert "### C2" not in page
     assert f"Not run yet: {', '.join(finding.name for finding in nothing[1:])}." in page
 

@@ -8,10 +8,11 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from mtcsirl.names import EVALUATION_TARGET
+from mtcsirl.names import EVALUATION_TARGET, LAST, distance_metric
 from mtcsirl.results.published import Published
-from mtcsirl.results.rows import KEY, MISSING, OK, select
-from mtcsirl.results.statistics import Array, Summary, probability_of_improvement, summarise
+from mtcsirl.results.rows import KEY, MISSING, OK, STALE, select
+from mtcsirl.results.statistics import Summary, probability_of_improvement, summarise
+from mtcsirl.rewards.ground_truth import COMMON_SENSE_REWARDS
 from mtcsirl.settings import Settings
 
 
@@ -19,13 +20,20 @@ from mtcsirl.settings import Settings
 class Group:
     """One kind of agent over seeds and tasks, judged by one cs-reward with the target value ``target``.
 
-    ``agents``: per task a frame of the stochastic policy's metrics [seed, metric].
+    ``agents``: per task a frame of the stochastic policy's metrics [seed, metric]; ``last``: the same agents with their
+    last policies where the kept ones are judged, else None.
     """
 
     stage: str
     agents: Mapping[str, pd.DataFrame]
     cs_reward: str
     target: float
+    last: "Group | None" = None
+
+    def on(self, task: str) -> "Group":
+        """The group on one of its tasks."""
+        last = None if self.last is None else self.last.on(task)
+        return Group(self.stage, {task: self.agents[task]}, self.cs_reward, self.target, last)
 
     def values(self, metric: str) -> pd.DataFrame:
         """``metric`` [seed, task]; NaN where an agent is not usable."""
@@ -48,14 +56,29 @@ class Group:
         return summarise(per_seed(self.distances))
 
     @cached_property
+    def gap(self) -> Summary:
+        """target - metric over seeds, mean over tasks per seed: d with its sign."""
+        return summarise(per_seed(self.target - self.values(self.cs_reward)))
+
+    @cached_property
     def success(self) -> Summary:
         """Share of successful episodes over seeds, mean over tasks per seed."""
         return summarise(per_seed(self.values("success")))
 
+    @cached_property
+    def step_distance(self) -> Summary:
+        """E|m - tau| of single steps over seeds: no oscillation about the target hides in it. n = 0 if not recorded."""
+        return summarise(per_seed(self.values(distance_metric(self.cs_reward))))
 
-def per_seed(values: pd.DataFrame) -> Array:
-    """Mean over tasks of each seed; NaN if one of its tasks is not usable."""
-    return values.mean(axis=1, skipna=False).to_numpy(dtype=float)
+
+def per_seed(values: pd.DataFrame) -> pd.Series:
+    """Mean over tasks of each seed [seed]; NaN if one of its tasks is not usable."""
+    return values.mean(axis=1, skipna=False)
+
+
+def behind(far: Group, near: Group) -> Summary:
+    """d(far) - d(near) of agents of the same seed, mean over each group's tasks."""
+    return summarise(per_seed(far.distances) - per_seed(near.distances))
 
 
 def closer(first: Group, second: Group) -> float:
@@ -69,23 +92,32 @@ def closer(first: Group, second: Group) -> float:
 
 @dataclass(frozen=True)
 class Evidence:
-    """All results of a study: ``evaluation_rows``, ``score_rows``, the settings and the paper's numbers."""
+    """All results of a study: ``evaluation_rows``, ``score_rows``, ``point_rows``, settings, the paper's numbers."""
 
     rows: pd.DataFrame
     scores: pd.DataFrame
+    points: pd.DataFrame
     settings: Settings
     published: Published
 
     @cached_property
     def _agents(self) -> pd.DataFrame:
-        """One row per agent: its key, its status, and its stochastic policy's metrics as columns."""
-        rows = select(self.rows, policy="stochastic")
-        return rows.pivot(index=[*KEY, "status"], columns="metric", values="value").reset_index()
+        """One row per agent: its key, its status, and its stochastic policy's metrics as columns.
+
+        Where SAC and the experts have two policies (column ``kept``), this is the one that was kept.
+        """
+        return _wide(self.rows[self.rows["kept"] != LAST] if "kept" in self.rows else self.rows)
 
     @cached_property
-    def _places(self) -> Mapping[Any, Any]:
-        """Where the agents with one key, all seeds, stand in ``_agents``."""
-        return self._agents.groupby([name for name in KEY if name != "seed"]).indices
+    def _last(self) -> pd.DataFrame:
+        """The same for the last policies of those that have two."""
+        return _wide(self.rows[self.rows["kept"] == LAST] if "kept" in self.rows else self.rows.iloc[:0])
+
+    @cached_property
+    def _places(self) -> tuple[Mapping[Any, Any], Mapping[Any, Any]]:
+        """Where the agents with one key, all seeds, stand in ``_agents`` and ``_last``."""
+        key = [name for name in KEY if name != "seed"]
+        return self._agents.groupby(key).indices, self._last.groupby(key).indices
 
     def group(
         self, cs_reward: str, tasks: Iterable[str], key: Mapping[str, str], target: int = EVALUATION_TARGET
@@ -95,9 +127,17 @@ class Evidence:
         A task without any agent makes every seed's mean over tasks unknown, as a missing agent does.
         """
         names = [key.get(name, "") for name in ("stage", "experiment", "method", "cs_reward", "source")]
-        places = {task: self._places.get((*names, task, target), np.array([], dtype=int)) for task in tasks}
-        agents = {task: self._agents.iloc[place].set_index("seed") for task, place in places.items()}
-        return Group(key["stage"], agents, cs_reward, self.published.target(cs_reward))
+        goal = COMMON_SENSE_REWARDS[cs_reward].target
+        nothing = np.array([], dtype=int)
+
+        def of(agents: pd.DataFrame, places: Mapping[Any, Any], last: Group | None) -> Group:
+            found = {task: places.get((*names, task, target), nothing) for task in tasks}
+            frames = {task: agents.iloc[place].set_index("seed") for task, place in found.items()}
+            return Group(key["stage"], frames, cs_reward, goal, last)
+
+        tasks = tuple(tasks)
+        last = of(self._last, self._places[1], None) if len(self._last) else None
+        return of(self._agents, self._places[0], last if last is not None and last.metric.n else None)
 
     def experts(self, cs_reward: str, tasks: Iterable[str]) -> Group:
         """Experts on ``tasks``."""
@@ -107,41 +147,54 @@ class Evidence:
         """Plain SAC on ``tasks``."""
         return self.group(cs_reward, tasks, {"stage": "train_sac"})
 
-    def transfers(self, run: "Run", tasks: Iterable[str], target: int = EVALUATION_TARGET) -> Group:
-        """New agents on ``tasks`` with the reward of ``run``."""
-        return self.group(run.cs_reward, tasks, {"stage": "transfer", **run.key}, target)
+    def transfers(self, source: "RewardSource", tasks: Iterable[str], target: int = EVALUATION_TARGET) -> Group:
+        """New agents on ``tasks`` with the rewards of ``source``."""
+        return self.group(source.cs_reward, tasks, {"stage": "transfer", **source.key}, target)
 
-    def generators(self, run: "Run", tasks: Iterable[str] | None = None) -> Group:
-        """The generators of ``run`` on the first of its targets, all its tasks or those given."""
-        return self.group(run.cs_reward, tasks or run.tasks, {"stage": "learn_reward", **run.key}, run.targets[0])
+    def generators(self, source: "RewardSource", tasks: Iterable[str] | None = None) -> Group:
+        """The generators of ``source`` on the first of its targets, all its tasks or those given."""
+        return self.group(
+            source.cs_reward, tasks or source.tasks, {"stage": "learn_reward", **source.key}, source.targets[0]
+        )
 
-    def blocked(self, run: "Run", needs: Iterable[str], share: float) -> str:
-        """Which of ``needs`` ("experts", "generators") of ``run`` failed their gate too often; "" if none did.
+    def blocked(self, source: "RewardSource", needs: Iterable[str], share: float) -> str:
+        """Which of ``needs`` ("experts", "generators") of ``source`` failed their gate too often; "" if none did.
 
-        An expert passes if it and its demonstrations do.
+        An expert passes if it and its demonstrations do. Of n agents the whole number nearest to ``share`` x n has to
+        pass, so that one of three may fail where 80 % are asked for.
         """
         keys: dict[str, dict[str, Any]] = {
             "experts": {
                 "stage": ["train_expert", "collect_demonstrations"],
-                "cs_reward": run.cs_reward,
-                "task": list(run.tasks),
-                "target": list(run.targets),
-                "seed": self.settings.seeds[0],
+                "cs_reward": source.cs_reward,
+                "task": list(source.tasks),
+                "target": list(source.targets),
+                "seed": list(source.expert_seeds(self.settings)),
             },
-            "generators": {"stage": "learn_reward", **run.key},
+            "generators": {"stage": "learn_reward", **source.key},
         }
         for name in needs:
             judged = select(self._agents, **keys[name])
-            judged = judged[judged["status"] != MISSING]
+            judged = judged[~judged["status"].isin([MISSING, STALE])]
             passed = (judged["status"] == OK).groupby([judged["task"], judged["target"], judged["seed"]]).all()
-            if passed.sum() < share * len(passed):
+            if passed.sum() < int(share * len(passed) + 0.5):
                 return f"{passed.sum()} of {len(passed)} {name} passed their gate"
         return ""
 
+    def scored(self, source: "RewardSource", task: str) -> pd.DataFrame:
+        """The single transitions on which the rewards of ``source`` were scored for ``task``."""
+        return select(self.points, **source.key, task=task) if len(self.points) else self.points
+
+
+def _wide(rows: pd.DataFrame) -> pd.DataFrame:
+    """One row per agent of the stochastic policy's rows, metrics as columns."""
+    chosen = select(rows, policy="stochastic")
+    return chosen.pivot(index=[*KEY, "status"], columns="metric", values="value").reset_index()
+
 
 @dataclass(frozen=True)
-class Run:
-    """The IRL runs of one experiment, method, cs-reward and source, over all seeds."""
+class RewardSource:
+    """Where learned rewards come from: the IRL runs of one experiment, method, cs-reward and source, all seeds."""
 
     experiment: str
     method: str
@@ -155,18 +208,27 @@ class Run:
         """Its columns in the rows."""
         return {name: getattr(self, name) for name in ("experiment", "method", "cs_reward", "source")}
 
+    def expert_seeds(self, settings: Settings) -> tuple[int, ...]:
+        """Seeds of the experts that its IRL runs imitate: each its own, but of several targets all the first."""
+        return settings.seeds[:1] if self.one_expert else settings.irl_seeds
 
-def single_target(cs_reward: str, task: str) -> Run:
+    @property
+    def one_expert(self) -> bool:
+        """Whether all its seeds imitate the same experts, so that what follows is conditional on those."""
+        return self.experiment == "multi_target"
+
+
+def single_target(cs_reward: str, task: str) -> RewardSource:
     """Section 5.1 on ``task``."""
-    return Run("single_target", "mt_csirl", cs_reward, task, (task,), (EVALUATION_TARGET,))
+    return RewardSource("single_target", "mt_csirl", cs_reward, task, (task,), (EVALUATION_TARGET,))
 
 
-def multi_target(settings: Settings, cs_reward: str, task: str) -> Run:
+def multi_target(settings: Settings, cs_reward: str, task: str) -> RewardSource:
     """Section 5.2 on ``task``."""
-    return Run("multi_target", "mt_csirl", cs_reward, task, (task,), settings.multi_target.train_targets)
+    return RewardSource("multi_target", "mt_csirl", cs_reward, task, (task,), settings.multi_target.train_targets)
 
 
-def multi_task(settings: Settings, cs_reward: str, method: str) -> Run:
+def multi_task(settings: Settings, cs_reward: str, method: str) -> RewardSource:
     """Sections 5.3 and 5.4."""
     study = settings.multi_task
-    return Run("multi_task", method, cs_reward, "all", study.train_tasks, study.train_targets)
+    return RewardSource("multi_task", method, cs_reward, "all", study.train_tasks, study.train_targets)

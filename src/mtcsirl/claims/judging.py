@@ -1,31 +1,37 @@
 """One judged unit of a claim, and the three-way answers that its state is put together from."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from mtcsirl.claims.evidence import Evidence, Group, Run, closer
-from mtcsirl.results.published import UNKNOWN as NOT_PRINTED
+from mtcsirl.claims.evidence import Evidence, Group, RewardSource, closer
+from mtcsirl.results.contrasts import SpreadRatio, fieller, spread_ratio
+from mtcsirl.results.published import NOT_PRINTED
 from mtcsirl.results.statistics import (
-    UNKNOWN,
+    ONE_SIDED,
+    UNKNOWN_INTERVAL,
     Estimate,
     Interval,
     Summary,
     Welch,
+    contrast,
     hedges_g,
     prediction_interval,
-    summarise,
     t_interval,
     welch,
 )
 
 MET, NOT_MET, UNCLEAR = "met", "not met", "unclear"
 TOO_FEW, BLOCKED, NOT_RUN = "too few seeds", "precondition not met", "not run"
-CORRELATION = "Pearson's r of learned and true reward"
-"""The measure of the claims about correlations."""
+SHOWN = "not judged"
+"""A unit that stands beside the judged ones for comparison."""
+LIKE_SAC, TRANSFERS, RUINED, FARTHER = "like SAC", "behaviour transfers", "agent ruined", "farther than SAC"
+UNDECIDED = "undecided"
+"""What became of new agents where the claim is that nothing does."""
 NO_ESTIMATE = Estimate(np.nan, np.nan, np.nan, 0)
+CONDITIONAL = "conditional on the experts: all IRL seeds imitate those of the first seed"
 Rules = Mapping[str, Any]
 Answer = tuple[str, str]
 """(met, not met or unclear; about what)."""
@@ -35,10 +41,12 @@ Answer = tuple[str, str]
 class Unit:
     """One judged cell of a claim, with every number that a reader may want to judge it by.
 
-    ``measure``: what the criterion looks at, ``value`` with its 95 % interval; ``ours``: the metric itself over seeds;
-    ``effect``: Hedges' g of ours against ``reference``, on the metric; ``difference``: Welch's test of the same;
+    ``measure``: what the criterion looks at, ``value`` with its 95 % interval, ``holds``: where on its scale the
+    criterion holds; ``outcome``: what became of the agents, where that has names; ``ours``: the metric itself over
+    seeds; ``effect``: Hedges' g of ours against ``reference``, on the metric; ``difference``: Welch's test of the same;
     ``closer``: probability that one of our agents is closer to the target than one of the reference's; ``prediction``:
-    where the paper's number says that ours should lie; ``paper_value``: ``measure`` of the paper's own numbers.
+    where the paper's number says that ours should lie; ``paper_value``: ``measure`` of the paper's own numbers;
+    ``power``: of an equivalence test at these spreads and seeds; ``notes``: what else a reader should know.
     """
 
     cs_reward: str
@@ -48,7 +56,9 @@ class Unit:
     measure: str
     value: Estimate
     ours: Summary
-    interval: Interval = UNKNOWN
+    holds: Interval = UNKNOWN_INTERVAL
+    outcome: str = ""
+    interval: Interval = UNKNOWN_INTERVAL
     success: Summary = NOT_PRINTED
     reference: str = ""
     reference_summary: Summary = NOT_PRINTED
@@ -56,8 +66,10 @@ class Unit:
     difference: Welch | None = None
     closer: float = np.nan
     paper: Summary = NOT_PRINTED
-    prediction: Interval = UNKNOWN
+    prediction: Interval = UNKNOWN_INTERVAL
     paper_value: float = np.nan
+    power: float = np.nan
+    notes: tuple[str, ...] = ()
 
     @property
     def inside(self) -> bool | None:
@@ -65,24 +77,28 @@ class Unit:
         known = np.isfinite(self.prediction.low) and np.isfinite(self.ours.mean)
         return self.prediction.contains(self.ours.mean) if known else None
 
+    @property
+    def spreads(self) -> SpreadRatio:
+        """The paper's spread against ours; extreme: its +- is not over the same seeds, "inside" then says nothing."""
+        return spread_ratio(self.paper, self.ours)
+
 
 def judged_unit(
     cs_reward: str,
     what: str,
     group: Group,
-    answers: list[Answer],
+    answers: Sequence[Answer],
     measure: str,
     value: Estimate,
     paper: Summary = NOT_PRINTED,
-    paper_value: float = np.nan,
+    **more: Any,
 ) -> Unit:
     """A unit whose state is the worst of its answers; its preconditions are yet to be checked."""
     ours = group.metric
-    state = next((s for s in (NOT_MET, UNCLEAR) if any(s == answer for answer, _ in answers)), MET)
     return Unit(
         cs_reward=cs_reward,
         what=what,
-        state=state,
+        state=worst(answers),
         reason="; ".join(f"{about}: {answer}" for answer, about in answers),
         measure=measure,
         value=value,
@@ -90,14 +106,26 @@ def judged_unit(
         interval=t_interval(ours),
         success=group.success,
         paper=paper,
-        prediction=prediction_interval(paper, ours.n) if paper.std > 0 else UNKNOWN,
-        paper_value=paper_value,
+        prediction=prediction_interval(paper, ours.n) if paper.std > 0 else UNKNOWN_INTERVAL,
+        notes=tuple(group_notes(group)),
+        **more,
     )
+
+
+def group_notes(group: Group) -> Iterator[str]:
+    """What the metric over whole episodes does not show of ``group``."""
+    steps = group.step_distance
+    if steps.n:
+        spread = "" if np.isnan(steps.std) else f"±{steps.std:.2f}"
+        yield f"E|m - tau| of single steps {steps.mean:.2f}{spread}; |E m - tau| {group.distance.mean:.2f}"
+    if group.last is not None:
+        yield f"kept policies; the last ones: {group.last.metric.mean:.2f}, here {group.metric.mean:.2f}"
 
 
 def against(unit: Unit, group: Group, reference: Group, name: str) -> Unit:
     """The unit with our agents compared to ``reference``."""
     base = reference.metric
+    kept = [f"{name}: {note}" for note in group_notes(reference) if note.startswith("kept")]
     return replace(
         unit,
         reference=name,
@@ -105,35 +133,54 @@ def against(unit: Unit, group: Group, reference: Group, name: str) -> Unit:
         effect=hedges_g(unit.ours, base),
         difference=welch(unit.ours, base),
         closer=closer(group, reference),
+        notes=(*unit.notes, *kept),
     )
 
 
-def checked(evidence: Evidence, unit: Unit, rules: Rules, run: Run | None, *groups: Group) -> Unit:
+def checked(evidence: Evidence, unit: Unit, rules: Rules, source: RewardSource | None, *groups: Group) -> Unit:
     """The unit, or why it cannot be judged: no results, failed experts or generators, no gap, too few seeds.
 
     The last of ``groups`` that is plain SAC is asked for room between it and the target.
     """
     seeds = [group.metric.n for group in groups]
     if min(seeds) == 0:
-        return replace(unit, state=NOT_RUN, reason="no agent has been trained for this, or none is usable")
+        return replace(unit, state=NOT_RUN, outcome="", reason="no agent has been trained for this, or none is usable")
     for group in groups:
         if group.stage == "train_sac" and group.distance.mean < rules["room"] * group.target:
             return replace(unit, state=BLOCKED, reason="SAC alone is on target: there is no gap to close")
-    if run is not None:
+    if source is not None:
         seeds.append(len(set(evidence.settings.irl_seeds)))
-    return checked_runs(evidence, unit, rules, run, min(seeds))
+    return checked_runs(evidence, unit, rules, source, min(seeds))
 
 
-def checked_runs(evidence: Evidence, unit: Unit, rules: Rules, run: Run | None, seeds: int) -> Unit:
+def checked_runs(evidence: Evidence, unit: Unit, rules: Rules, source: RewardSource | None, seeds: int) -> Unit:
     """The unit, or why it cannot be judged, for units without agents: correlations."""
     if seeds == 0:
         return replace(unit, state=NOT_RUN, reason="no reward has been scored for this")
-    why = evidence.blocked(run, rules["needs"], rules["gates"]) if run is not None else ""
-    if why:
-        return replace(unit, state=BLOCKED, reason=why)
+    if source is not None:
+        why = evidence.blocked(source, rules["needs"], rules["gates"])
+        if why:
+            return replace(unit, state=BLOCKED, reason=why)
+        if source.one_expert:
+            unit = replace(unit, notes=(*unit.notes, CONDITIONAL))
     if seeds < rules["seeds"]:
         return replace(unit, state=TOO_FEW, reason=f"{seeds} of the {rules['seeds']} independent seeds a verdict needs")
     return unit
+
+
+def works_at_home(unit: Unit, own: Group, sac: Group, needed: float) -> Unit:
+    """The unit, unless its reward fails on its own task too: then transfer is not what fails elsewhere."""
+    answer, _ = closing(own.distance, sac.distance, needed)
+    if unit.state in (MET, NOT_MET, UNCLEAR) and answer == NOT_MET:
+        return replace(unit, state=BLOCKED, reason="its reward does not transfer to its own task either")
+    if unit.state == MET and answer == UNCLEAR:
+        return replace(unit, state=UNCLEAR, reason=f"{unit.reason}; transfers to its own task: {UNCLEAR}")
+    return unit
+
+
+def worst(answers: Sequence[Answer]) -> str:
+    """Not met if one answer is, else unclear if one is."""
+    return next((state for state in (NOT_MET, UNCLEAR) if any(answer == state for answer, _ in answers)), MET)
 
 
 def three_way(holds: bool, refuted: bool, about: str) -> Answer:
@@ -141,52 +188,44 @@ def three_way(holds: bool, refuted: bool, about: str) -> Answer:
     return (NOT_MET if refuted else MET if holds else UNCLEAR), about
 
 
+def surely(about: str, *terms: tuple[float, Summary], constant: float = 0.0) -> Answer:
+    """Met if the contrast (see ``statistics.contrast``) is at least 0, not met if it is below, each surely.
+
+    Surely: by its one-sided 95 % bound.
+    """
+    test = contrast(*terms, constant=constant, confidence=ONE_SIDED)
+    return three_way(test.low >= 0, test.high < 0, about)
+
+
 def at_least(summary: Summary, limit: float, about: str) -> Answer:
-    """Met: the mean is at least ``limit``. Not met: the whole t-interval is below."""
-    return three_way(summary.mean >= limit, t_interval(summary).high < limit, f"{about} at least {limit:g}")
+    """Whether the mean is surely at least ``limit``."""
+    return surely(f"{about} at least {limit:g}", (1.0, summary), constant=-limit)
 
 
 def at_most(summary: Summary, limit: float, about: str) -> Answer:
-    """Met: the mean is at most ``limit``. Not met: the whole t-interval is above."""
-    return three_way(summary.mean <= limit, t_interval(summary).low > limit, f"{about} at most {limit:g}")
-
-
-def advantage(test: Welch, needed: float, about: str) -> Answer:
-    """Met: at least ``needed`` and surely more than 0. Not met: surely less than ``needed``."""
-    return three_way(test.difference >= needed and test.low > 0, test.high < needed, about)
+    """Whether the mean is surely at most ``limit``."""
+    return surely(f"{about} at most {limit:g}", (-1.0, summary), constant=limit)
 
 
 def closing(distance: Summary, sac: Summary, part: float) -> Answer:
-    """Met: at least ``part`` of SAC's gap closed and surely closer than SAC. Not met: surely less than ``part``.
-
-    d <= (1 - part) d_SAC is a contrast of two means, so that its interval carries the spread of SAC too.
-    """
-    contrast = welch(distance, scaled(sac, 1 - part))
-    holds = contrast.difference <= 0 and welch(distance, sac).high < 0
-    return three_way(holds, contrast.low > 0, f"closes at least {100 * part:g} % of SAC's gap")
+    """Whether surely at least ``part`` of SAC's gap is closed: (1 - part) d_SAC - d >= 0, which knows SAC's spread."""
+    return surely(f"closes at least {100 * part:g} % of SAC's gap", (1 - part, sac), (-1.0, distance))
 
 
-def closed(group: Group, sac: Group) -> Estimate:
-    """1 - d / d_SAC with the t-interval over our seeds, SAC's mean taken as known (the verdict does not)."""
-    base = sac.distance.mean
-    part = summarise(1 - group.distances.mean(axis=1, skipna=False).to_numpy(dtype=float) / base)
-    return Estimate(part.mean, *t_interval(part), part.n)
+def staying_below(distance: Summary, sac: Summary, part: float) -> Answer:
+    """Whether surely at most ``part`` of SAC's gap is closed."""
+    return surely(f"closes at most {100 * part:g} % of SAC's gap", (1.0, distance), (-(1 - part), sac))
+
+
+def closed(distance: Summary, sac: Summary) -> Estimate:
+    """1 - d / d_SAC with Fieller's interval: SAC's gap is estimated too."""
+    rest = fieller(distance, sac)
+    return Estimate(1 - rest.value, 1 - rest.high, 1 - rest.low, rest.n)
 
 
 def closed_in_paper(paper: float, sac: float, target: float) -> float:
     """1 - d / d_SAC of the paper's printed means."""
     return 1 - abs(paper - target) / abs(sac - target)
-
-
-def judge_correlation(r: Estimate, rules: Rules) -> str:
-    """``at_most``: |r| is small and surely not large; ``at_least``: r is large and surely not small."""
-    if "at_most" in rules:
-        small = abs(r.value) <= rules["at_most"] and max(abs(r.low), abs(r.high)) <= rules["surely"]
-        state, _ = three_way(small, r.low > rules["at_most"] or r.high < -rules["at_most"], "")
-    else:
-        large = r.value >= rules["at_least"] and r.low >= rules["surely"]
-        state, _ = three_way(large, r.high < rules["at_least"], "")
-    return state
 
 
 def scaled(summary: Summary, factor: float) -> Summary:

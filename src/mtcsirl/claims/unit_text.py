@@ -6,7 +6,8 @@ replication, whether the original lies in our interval, whether the effect diffe
 
 import numpy as np
 
-from mtcsirl.claims.judging import CORRELATION, Unit
+from mtcsirl.claims.judging import Unit
+from mtcsirl.claims.scored import PARTIAL
 from mtcsirl.results.statistics import Estimate, Interval, Summary
 
 DASH = "–"
@@ -21,6 +22,7 @@ COLUMNS = {
     "difference": "differs from the reference (Welch)",
     "effect": "Hedges' g against the reference",
     "why": "why",
+    "notes": "beside it",
 }
 """Key and heading of each text, in the order in which they are printed."""
 
@@ -29,15 +31,16 @@ def unit_texts(unit: Unit) -> dict[str, str]:
     """The texts of ``COLUMNS``; intervals are 95 %, a dash says that the criterion does not apply."""
     return {
         "unit": f"{unit.cs_reward.replace('_', ' ')}, {unit.what}",
-        "judged": unit.state,
+        "judged": f"{unit.state}: {unit.outcome}" if unit.outcome else unit.state,
         "paper": "no number" if np.isnan(unit.paper.mean) else _spread(unit.paper),
         "ours": _ours(unit),
         "measure": _measure(unit),
-        "ours_in_prediction": _contains(unit.prediction, unit.ours.mean),
+        "ours_in_prediction": _prediction(unit),
         "paper_in_interval": _contains(unit.interval, unit.paper.mean),
         "difference": _difference(unit),
         "effect": _effect(unit),
         "why": unit.reason,
+        "notes": "; ".join([*_power(unit), *unit.notes]) or DASH,
     }
 
 
@@ -52,8 +55,22 @@ def _measure(unit: Unit) -> str:
     """As in "part of SAC's gap closed: 0.84 [0.80, 0.88]; paper 0.83"."""
     if unit.value.n == 0 or np.isnan(unit.value.value):
         return DASH
-    paper = "" if np.isnan(unit.paper_value) or unit.measure == CORRELATION else f"; paper {unit.paper_value:.2f}"
+    paper = "" if np.isnan(unit.paper_value) or unit.measure == PARTIAL else f"; paper {unit.paper_value:.2f}"
     return f"{unit.measure}: {_estimate(unit.value)}{paper}"
+
+
+def _prediction(unit: Unit) -> str:
+    """Whether ours lies in the paper's interval, and whether its spread can be one over seeds like ours."""
+    text = _contains(unit.prediction, unit.ours.mean)
+    if text == DASH or not unit.spreads.extreme:
+        return text
+    return f"{text}, uninformative: spreads {unit.paper.std:.2g} and {unit.ours.std:.2g} (F = {unit.spreads.ratio:.3g})"
+
+
+def _power(unit: Unit) -> list[str]:
+    if np.isnan(unit.power):
+        return []
+    return [f"power {100 * unit.power:.0f} % at these spreads and seeds, were both equal"]
 
 
 def _difference(unit: Unit) -> str:
@@ -89,4 +106,8 @@ def _estimate(estimate: Estimate, digits: int = 2) -> str:
 
 
 def _bounds(interval: Interval, digits: int = 2) -> str:
-    return "" if np.isnan(interval.low) else f" [{interval.low:.{digits}f}, {interval.high:.{digits}f}]"
+    if np.isnan(interval.low):
+        return ""
+    if np.isinf([interval.low, interval.high]).any():
+        return " [no finite bounds: SAC's gap is not surely there]"
+    return f" [{interval.low:.{digits}f}, {interval.high:.{digits}f}]"

@@ -198,7 +198,7 @@ def _ablation(parsed: argparse.Namespace) -> None:
 
 def _claims(parsed: argparse.Namespace) -> None:
     from mtcsirl.claims.claims import claims_json, claims_markdown
-    from mtcsirl.figures.claims import CAPTION, claims_figure
+    from mtcsirl.figures.claims import caption, claims_figure
     from mtcsirl.files.storage import write_json, write_text
 
     settings = study_settings(parsed)
@@ -208,18 +208,22 @@ def _claims(parsed: argparse.Namespace) -> None:
     text = claims_markdown(findings, settings)
     write_json(folder / "claims.json", claims_json(findings, settings))
     write_text(folder / "claims.md", text)
-    write_figure(folder / "claims", claims_figure(findings, settings), CAPTION)
+    write_figure(folder / "claims", claims_figure(findings, settings), caption())
     _sign(parsed, settings, "claims", home, folder)
     print(text)
 
 
 def _judged(settings: Settings, partial: bool) -> "list[Finding]":
+    import pandas as pd
+
     from mtcsirl.claims.claims import judge
-    from mtcsirl.results.rows import evaluation_rows, score_rows
+    from mtcsirl.results.rows import evaluation_rows, last_rows, point_rows, score_rows
 
     runs = design(settings, CLAIMS)
-    rows = evaluation_rows(runs, settings, partial=partial)
-    return judge(rows, score_rows(runs, settings, partial=partial), settings)
+    rows, last, scores, points = (
+        read(runs, settings, partial=partial) for read in (evaluation_rows, last_rows, score_rows, point_rows)
+    )
+    return judge(pd.concat([rows, last], ignore_index=True), scores, settings, points=points)
 
 
 def _results(parsed: argparse.Namespace) -> None:

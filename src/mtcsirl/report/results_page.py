@@ -16,7 +16,7 @@ HEAD = """\
 
 Written by `{command}`; edit nothing here. {scale}.
 The paper's numbers stand beside ours; how each claim was judged stands in
-[the criteria](../src/mtcsirl/claims/claims.yaml), fixed before the runs.
+[the criteria](../src/mtcsirl/claims/claims.yaml).
 """
 
 

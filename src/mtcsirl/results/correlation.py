@@ -23,7 +23,7 @@ Correlation = Callable[..., float]
 """Of two vectors [N], or of three with the one that is held fixed last."""
 
 
-_NOTHING_LEFT = 1e-10
+NOTHING_LEFT = 1e-10
 """1 - r^2 below which a reward in float32 is a straight line in another."""
 
 
@@ -49,7 +49,7 @@ def partial_correlation(f: Array, c: Array, t: Array) -> float:
     if np.isnan(ft) and np.isnan(ct):  # t does not vary; or f or c neither, and then fc is NaN too
         return fc
     left = (1 - ft**2) * (1 - ct**2)
-    if np.isnan(left) or min(1 - ft**2, 1 - ct**2) < _NOTHING_LEFT:
+    if np.isnan(left) or min(1 - ft**2, 1 - ct**2) < NOTHING_LEFT:
         return np.nan
     return float(np.clip((fc - ft * ct) / np.sqrt(left), -1.0, 1.0))
 

@@ -13,7 +13,7 @@ from mtcsirl.results.statistics import Summary
 
 PAPER_ORDER = ("action_norm", "velocity")
 RATIO_TABLES = {"action_norm": "table_1", "velocity": "table_3"}
-UNKNOWN = Summary(np.nan, np.nan, 0)
+NOT_PRINTED = Summary(np.nan, np.nan, 0)
 """What the paper does not print."""
 
 
@@ -26,27 +26,18 @@ def in_paper_order(cs_rewards: Iterable[str]) -> tuple[str, ...]:
 class Published:
     """Look-ups by table; a number comes as mean, sd (NaN where none is printed) and number of seeds.
 
-    What the paper does not report, for example for a task or cs-reward of one's own, is ``UNKNOWN``.
+    What the paper does not report, for example for a task or cs-reward of one's own, is ``NOT_PRINTED``.
     """
 
     def __init__(self, data: dict[str, Any]) -> None:
         self.data = data
         self.seeds: int = data["seeds"]
 
-    def target(self, cs_reward: str) -> float:
-        """The target value of a cs-reward: 0.8 m/s, |a|_1 = 3, and for one of your own what its registry entry says."""
-        if cs_reward in self.data["targets"]:
-            return float(self.data["targets"][cs_reward])
-        from mtcsirl.rewards.ground_truth import COMMON_SENSE_REWARDS
-
-        own = COMMON_SENSE_REWARDS.get(cs_reward)
-        return np.nan if own is None else own.target
-
     def cross_transfer(self, cs_reward: str, source: str, task: str) -> Summary:
         """Tables 1 and 3: metric / target of new agents on ``task`` with the reward learned on ``source``."""
         table = self.data.get(RATIO_TABLES.get(cs_reward, ""), {"tasks": []})
         if source not in table["tasks"] or task not in table["tasks"]:
-            return UNKNOWN
+            return NOT_PRINTED
         row, column = table["tasks"].index(source), table["tasks"].index(task)
         return self._summary(table["ratio"][row][column], None)
 
@@ -54,7 +45,7 @@ class Published:
         """Tables 1 and 3, in parentheses: metric / target of plain SAC on ``task``."""
         table = self.data.get(RATIO_TABLES.get(cs_reward, ""), {"tasks": []})
         if task not in table["tasks"]:
-            return UNKNOWN
+            return NOT_PRINTED
         return self._summary(table["diagonal_sac_baseline"][table["tasks"].index(task)], None)
 
     def unseen(self, agent: str, cs_reward: str, metric: str) -> Summary:
@@ -74,7 +65,7 @@ class Published:
             ("multi_task", "velocity"): self.data["figure_3"]["c_correlation"]["velocity"],
             ("multi_task", "action_norm"): self.data["figure_7"]["correlation"]["action_norm"],
         }.get((experiment, cs_reward))
-        return UNKNOWN if found is None else Summary(float(found), np.nan, 1)
+        return NOT_PRINTED if found is None else Summary(float(found), np.nan, 1)
 
     @property
     def hyperparameters(self) -> dict[str, Any]:
@@ -83,10 +74,10 @@ class Published:
 
     def _of(self, cell: dict[str, float] | None, metric: str, names: dict[str, tuple[str, str]]) -> Summary:
         if cell is None or metric not in names:
-            return UNKNOWN
+            return NOT_PRINTED
         mean, sd = (cell.get(name) for name in names[metric])
         if mean is None:
-            return UNKNOWN
+            return NOT_PRINTED
         percent = 0.01 if metric == "success" else 1.0
         return self._summary(percent * mean, None if sd is None else percent * sd)
 

@@ -57,7 +57,9 @@ class Welch(NamedTuple):
     p: float
 
 
-UNKNOWN = Interval(np.nan, np.nan)
+UNKNOWN_INTERVAL = Interval(np.nan, np.nan)
+ONE_SIDED = 0.90
+"""Confidence of the interval whose two ends are one-sided 95 % bounds."""
 
 
 def summarise(values: ArrayLike) -> Summary:
@@ -71,7 +73,7 @@ def summarise(values: ArrayLike) -> Summary:
 def t_interval(summary: Summary, confidence: float = 0.95) -> Interval:
     """Interval m +- t((1 + confidence) / 2, n - 1) s / sqrt(n) of the mean."""
     if summary.n < 2:
-        return UNKNOWN
+        return UNKNOWN_INTERVAL
     half = float(_t(confidence, summary.n - 1) * summary.std / np.sqrt(summary.n))
     return Interval(summary.mean - half, summary.mean + half)
 
@@ -82,39 +84,33 @@ def prediction_interval(original: Summary, runs: int, confidence: float = 0.95) 
     m +- t((1 + confidence) / 2, n0 - 1) s sqrt(1 / n0 + 1 / n1) with n0 the original's seeds and n1 = ``runs``.
     """
     if original.n < 2 or runs < 1:
-        return UNKNOWN
+        return UNKNOWN_INTERVAL
     half = float(_t(confidence, original.n - 1) * original.std * np.sqrt(1 / original.n + 1 / runs))
     return Interval(original.mean - half, original.mean + half)
 
 
-def welch(first: Summary, second: Summary, confidence: float = 0.95) -> Welch:
-    """Welch's test of ``first`` - ``second``, from summaries so that a paper's printed numbers can enter.
+def contrast(*terms: tuple[float, Summary], constant: float = 0.0, confidence: float = 0.95) -> Welch:
+    """Test of ``constant`` + sum of weight x mean against 0, for (weight, summary) of independent samples.
 
-    Degrees of freedom after Welch and Satterthwaite. With no spread on both sides the interval is the difference.
+    v_i = (w_i s_i)^2 / n_i; the error is sqrt(sum v_i) with (sum v_i)^2 / sum(v_i^2 / (n_i - 1)) degrees of freedom,
+    after Welch and Satterthwaite. Without any spread the interval is the value itself.
     """
-    difference = first.mean - second.mean
-    if first.n < 2 or second.n < 2:
-        return Welch(difference, np.nan, np.nan, np.nan, np.nan, np.nan)
-    a, b = first.std**2 / first.n, second.std**2 / second.n
-    error = float(np.sqrt(a + b))
+    value = constant + sum(weight * summary.mean for weight, summary in terms)
+    if any(summary.n < 2 for _, summary in terms):
+        return Welch(value, np.nan, np.nan, np.nan, np.nan, np.nan)
+    parts = [(weight * summary.std) ** 2 / summary.n for weight, summary in terms]
+    error = float(np.sqrt(sum(parts)))
     if error == 0:
-        p = 1.0 if difference == 0 else 0.0
-        return Welch(difference, difference, difference, np.nan, np.nan, p)
-    degrees = float((a + b) ** 2 / (a**2 / (first.n - 1) + b**2 / (second.n - 1)))
+        return Welch(value, value, value, np.nan, np.nan, 1.0 if value == 0 else 0.0)
+    degrees = sum(parts) ** 2 / sum(v**2 / (summary.n - 1) for v, (_, summary) in zip(parts, terms, strict=True))
     half = _t(confidence, degrees) * error
-    t = difference / error
-    p = float(2 * stats.t.sf(abs(t), degrees))
-    return Welch(difference, difference - half, difference + half, float(t), degrees, p)
+    t = value / error
+    return Welch(value, value - half, value + half, float(t), degrees, float(2 * stats.t.sf(abs(t), degrees)))
 
 
-def equivalent(first: Summary, second: Summary, margin: float, confidence: float = 0.95) -> bool:
-    """Whether the means differ by less than ``margin``: two one-sided tests (TOST) at level 1 - ``confidence``.
-
-    Holds if the (2 confidence - 1) Welch interval of the difference, 90 % by default, lies inside +- margin. A wide
-    interval is never equivalent, so that few or noisy seeds cannot pass for "no difference".
-    """
-    test = welch(first, second, 2 * confidence - 1)
-    return bool(-margin < test.low and test.high < margin)
+def welch(first: Summary, second: Summary, confidence: float = 0.95) -> Welch:
+    """Welch's test of ``first`` - ``second``, from summaries so that a paper's printed numbers can enter."""
+    return contrast((1.0, first), (-1.0, second), confidence=confidence)
 
 
 def hedges_g(first: Summary, second: Summary, confidence: float = 0.95) -> Estimate:
@@ -201,16 +197,6 @@ def cluster_bootstrap(
     return Estimate(float(statistic(rows)), *_percentiles(draws, confidence), n)
 
 
-def fisher_z_interval(r: float, n: int, confidence: float = 0.95) -> Interval:
-    """tanh(artanh r +- z / sqrt(n - 3)) for a correlation of ``n`` independent pairs."""
-    if n < 4 or np.isnan(r):
-        return UNKNOWN
-    if abs(r) >= 1:
-        return Interval(r, r)
-    half = stats.norm.ppf((1 + confidence) / 2) / np.sqrt(n - 3)
-    return Interval(float(np.tanh(np.arctanh(r) - half)), float(np.tanh(np.arctanh(r) + half)))
-
-
 def mean_correlation(correlations: ArrayLike, confidence: float = 0.95) -> Estimate:
     """Mean correlation over seeds on Fisher's z scale with the t-interval of that mean, back in r."""
     clipped = np.clip(_known(correlations), -1 + 1e-12, 1 - 1e-12)
@@ -248,7 +234,7 @@ def _superiority(x: Array, y: Array) -> float:
 
 def _percentiles(draws: Sequence[float], confidence: float) -> Interval:
     if np.isnan(draws).all():
-        return UNKNOWN
+        return UNKNOWN_INTERVAL
     low, high = np.nanpercentile(draws, [50 * (1 - confidence), 50 * (1 + confidence)])
     return Interval(float(low), float(high))
 

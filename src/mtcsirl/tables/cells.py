@@ -11,7 +11,7 @@ from mtcsirl.names import KEPT
 from mtcsirl.results.notes import Note, lacks_notes
 from mtcsirl.results.rows import BELOW_GATE, DUPLICATED, FOREIGN, INCOMPLETE, MISSING, STALE, matrix, select
 from mtcsirl.results.statistics import (
-    UNKNOWN,
+    UNKNOWN_INTERVAL,
     Estimate,
     Interval,
     Summary,
@@ -147,7 +147,7 @@ def make_cell(rows: pd.DataFrame, metric: str, paper: Summary, scale: float = 1.
         ours=ours,
         interval=_possible(t_interval(ours), metric),
         paper=paper,
-        prediction=_possible(prediction_interval(paper, ours.n), metric) if paper.std > 0 else UNKNOWN,
+        prediction=_possible(prediction_interval(paper, ours.n), metric) if paper.std > 0 else UNKNOWN_INTERVAL,
         deterministic=summarise(greedy).mean,
         iqm=_interquartile(chosen, scale),
         expected=chosen["seed"].nunique(),

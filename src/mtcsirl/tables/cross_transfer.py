@@ -6,6 +6,7 @@ from mtcsirl.names import EVALUATION_TARGET
 from mtcsirl.results.notes import left_out, remarks
 from mtcsirl.results.published import RATIO_TABLES, Published
 from mtcsirl.results.rows import select
+from mtcsirl.rewards.ground_truth import COMMON_SENSE_REWARDS
 from mtcsirl.settings import Settings
 from mtcsirl.tables.cells import Cell, make_cell, unusable
 from mtcsirl.tables.entries import Entry, Layout, Quantity, Row, result_table
@@ -20,13 +21,14 @@ def transfer_cell(rows: pd.DataFrame, published: Published, cs_reward: str, sour
     key = {"stage": "transfer", "experiment": "multi_target", "cs_reward": cs_reward}
     chosen = select(rows, **key, source=source, task=task, target=EVALUATION_TARGET)
     paper = published.cross_transfer(cs_reward, source, task)
-    return make_cell(chosen, cs_reward, paper, published.target(cs_reward))
+    return make_cell(chosen, cs_reward, paper, COMMON_SENSE_REWARDS[cs_reward].target)
 
 
 def baseline_cell(rows: pd.DataFrame, published: Published, cs_reward: str, task: str) -> Cell:
     """metric / target of plain SAC on ``task``."""
     chosen = select(rows, stage="train_sac", task=task, target=EVALUATION_TARGET)
-    return make_cell(chosen, cs_reward, published.cross_baseline(cs_reward, task), published.target(cs_reward))
+    paper = published.cross_baseline(cs_reward, task)
+    return make_cell(chosen, cs_reward, paper, COMMON_SENSE_REWARDS[cs_reward].target)
 
 
 def cross_transfer_table(
@@ -60,7 +62,8 @@ def cross_transfer_table(
         *left_out("tasks", papers, tasks),
         *remarks([REMARK]),
     )
-    return result_table(name, _caption(cs_reward, published.target(cs_reward), settings), layout, settings, notes)
+    caption = _caption(cs_reward, COMMON_SENSE_REWARDS[cs_reward].target, settings)
+    return result_table(name, caption, layout, settings, notes)
 
 
 def _caption(cs_reward: str, target: float, settings: Settings) -> str:

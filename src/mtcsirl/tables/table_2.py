@@ -4,8 +4,9 @@ import pandas as pd
 
 from mtcsirl.names import EVALUATION_TARGET, agent_label, distance_metric
 from mtcsirl.results.notes import left_out, remarks
-from mtcsirl.results.published import PAPER_ORDER, UNKNOWN, Published, in_paper_order, load_published
+from mtcsirl.results.published import NOT_PRINTED, PAPER_ORDER, Published, in_paper_order, load_published
 from mtcsirl.results.rows import select
+from mtcsirl.rewards.ground_truth import COMMON_SENSE_REWARDS
 from mtcsirl.settings import Settings
 from mtcsirl.tables.cells import Cell, make_cell, unusable
 from mtcsirl.tables.entries import Entry, Layout, Quantity, Row, result_table
@@ -46,7 +47,7 @@ def agent_cell(
     rows: pd.DataFrame, settings: Settings, published: Published, agent: str, cs_reward: str, metric: str
 ) -> Cell:
     """``metric`` of ``agent``, mean over unseen tasks per seed."""
-    paper = UNKNOWN if metric.endswith("_distance") else published.unseen(agent, cs_reward, metric)
+    paper = NOT_PRINTED if metric.endswith("_distance") else published.unseen(agent, cs_reward, metric)
     return make_cell(agent_rows(rows, settings, agent, cs_reward), metric, paper)
 
 
@@ -69,7 +70,7 @@ def table_2(rows: pd.DataFrame, settings: Settings, published: Published | None 
             )
             for agent in agents
         ]
-        sections.append((f"{name}, target τ = {published.target(cs):g}", body))
+        sections.append((f"{name}, target τ = {COMMON_SENSE_REWARDS[cs].target:g}", body))
     notes = (
         *unusable(rows),
         *left_out("methods", published.data["table_2"]["rows"], agents, label=agent_label),

@@ -6,6 +6,7 @@ from mtcsirl.names import agent_label
 from mtcsirl.results.notes import left_out, remarks
 from mtcsirl.results.published import PAPER_ORDER, Published, in_paper_order, load_published
 from mtcsirl.results.rows import select
+from mtcsirl.rewards.ground_truth import COMMON_SENSE_REWARDS
 from mtcsirl.settings import Settings
 from mtcsirl.tables.cells import Cell, make_cell, unusable
 from mtcsirl.tables.entries import Entry, Layout, Quantity, Row, result_table
@@ -29,7 +30,7 @@ def learned_task_cell(
     """``metric`` (the cs-reward's as a ratio to its target, or success) of new agents on ``task``."""
     key = {"stage": "transfer", "experiment": "multi_task", "method": "mt_csirl_lt", "cs_reward": cs_reward}
     chosen = select(rows, **key, task=task, target=settings.multi_task.train_targets[0])
-    scale = published.target(cs_reward) if metric == cs_reward else 1.0
+    scale = COMMON_SENSE_REWARDS[cs_reward].target if metric == cs_reward else 1.0
     return make_cell(chosen, metric, published.learned_task(task, cs_reward, metric), scale)
 
 
@@ -50,7 +51,7 @@ def table_4(rows: pd.DataFrame, settings: Settings, published: Published | None 
             )
             for task in settings.multi_task.train_tasks
         ]
-        sections.append((f"{name}, target {published.target(cs):g}", body))
+        sections.append((f"{name}, target {COMMON_SENSE_REWARDS[cs].target:g}", body))
     notes = (
         *unusable(rows),
         *left_out("method", ["mt_csirl_lt"], settings.methods, label=agent_label),
