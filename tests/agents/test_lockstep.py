@@ -123,7 +123,10 @@ def _diverging(jobs, agent: int, step: int) -> Training:
     return training
 
 
-def test_an_agent_whose_simulation_diverges_starts_over_and_no_other_notices(jobs, alone, tmp_path) -> None:
+def test_an_agent_whose_simulation_diverges_starts_over_and_no_other_notices(
+    jobs, alone, tmp_path, monkeypatch
+) -> None:
+    monkeypatch.chdir(tmp_path)  # MuJoCo writes a log where it is
     lone, batch = _diverging([jobs[0]], 0, 170), _diverging([jobs[1], jobs[0], jobs[3]], 1, 170)
     for training in (lone, batch):
         training.run()
