@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import torch
 
+from mtcsirl.agents import resume
 from mtcsirl.agents.finite import NotFiniteError, broken_agents, broken_rows
 from mtcsirl.agents.jobs import AgentJob
 from mtcsirl.agents.training import Training, train_agents
@@ -56,8 +57,6 @@ def test_a_learning_rate_that_explodes_ends_the_run_and_leaves_the_checkpoint_fr
         for part in ("drawer-close-t1 s0: ", "became non-finite at step", "sac.critic_learning_rate 1e+10", str(file))
     )
     training = Training([job], checkpoints=[file], log=lambda line: None)
-    from mtcsirl.agents import resume
-
     resume.restore(training, [resume.load(job, file)], lines.append)
     assert training.step >= 100, "the last checkpoint is of a step with numbers"
     assert training.learner.broken_agents() == {}

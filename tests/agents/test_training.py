@@ -10,7 +10,9 @@ from mtcsirl.agents import resume
 from mtcsirl.agents import selection as selection_module
 from mtcsirl.agents.jobs import AgentJob, gate_score
 from mtcsirl.agents.training import Training, train_agents
+from mtcsirl.episodes.evaluation import evaluate
 from mtcsirl.errors import UserError
+from mtcsirl.names import KEPT, LAST
 from mtcsirl.rewards.adapter import ground_truth
 from tests.agents.bytes import killed_at, run
 
@@ -209,3 +211,26 @@ def test_gate_score_puts_success_first(small_run):
 def test_events_are_written_on_request(small_run, tmp_path):
     train_agents([expert(small_run)], log=lambda line: None, events=tmp_path / "events")
     assert list((tmp_path / "events").glob("events.out.tfevents*"))
+
+
+def test_a_policy_that_is_kept_and_last_is_evaluated_once(small_run, monkeypatch):
+    """Its rows are those of an evaluation of its own all the same; a policy kept from before has others."""
+    for score, twice in ((1.0, False), (-1.0, True)):
+        scores = iter([(0.0, 0.0, score * step) for step in (100, 200, 300)])
+        monkeypatch.setattr(selection_module, "gate_score", lambda job, means, scores=scores: next(scores))
+        training = Training([expert(small_run)], log=lambda line: None)
+        training.run()
+        calls = []
+        each = training.environments.each
+
+        def counted(function, arguments, each=each, calls=calls):
+            calls.append(sum(own is not None for own in arguments))
+            return each(function, arguments)
+
+        training.environments.each = counted
+        (agent,) = training.finish()
+        assert sum(calls) == (2 if twice else 1)
+        job = training.jobs[0]
+        own = evaluate(training.policy(0), job.task, job.target, job.cs_reward, job.seed, job.settings, LAST)
+        assert [row for row in agent.evaluation if row[KEPT] == LAST] == own
+        training.close()

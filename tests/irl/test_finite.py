@@ -46,7 +46,10 @@ def test_what_a_healthy_run_leaves_is_finite(demonstrations, tmp_path) -> None:
     assert broken_row([correlation, accuracy]) == accuracy
 
 
-def test_a_generator_whose_simulation_diverges_has_failed_and_starts_over(demonstrations) -> None:
+def test_a_generator_whose_simulation_diverges_has_failed_and_starts_over(
+    demonstrations, tmp_path, monkeypatch
+) -> None:
+    monkeypatch.chdir(tmp_path)  # MuJoCo writes a log where it is
     trainer = make_trainer("mt_csirl", "velocity", demonstrations, 100, _settings())
     simulator = trainer.world.environments.environments[1].simulator
     original = trainer.world.environments.step

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 from mtcsirl.agents.sac import FusedSac
 from mtcsirl.settings import SacSettings
@@ -11,6 +11,8 @@ from mtcsirl.worlds.environments import ACTION_SIZE, OBSERVATION_SIZE
 
 if TYPE_CHECKING:
     from mtcsirl.agents.reference import ReferenceSac
+
+Learner: TypeAlias = "FusedSac | ReferenceSac"
 
 
 def make_learner(
@@ -20,7 +22,7 @@ def make_learner(
     *,
     observation_size: int = OBSERVATION_SIZE,
     action_size: int = ACTION_SIZE,
-) -> FusedSac | ReferenceSac:
+) -> Learner:
     """The learner that `sac.learner` names."""
     if settings.learner == "stable_baselines3":
         from mtcsirl.agents.reference import ReferenceSac

@@ -9,6 +9,7 @@ from typing import Any, Protocol
 from torch import Tensor
 
 from mtcsirl.agents.jobs import AgentJob
+from mtcsirl.agents.learners import Learner
 from mtcsirl.agents.replay import Replay
 from mtcsirl.agents.selection import Selection
 from mtcsirl.episodes.policy import Policy
@@ -18,21 +19,21 @@ from mtcsirl.rewards.mixture import PolicyReward
 
 
 class Resumable(Protocol):
-    """What of a training its checkpoints hold; see ``agents.training.Training``."""
+    """What of a training its checkpoints hold, by agent; see `Training`."""
 
     jobs: list[AgentJob]
     checkpoints: list[Path | None]
-    learner: Any
+    learner: Learner
     replay: Replay
     reward: PolicyReward
-    selections: list[Selection]
     recent: list[list[bool]]
+    selections: list[Selection]
     curves: list[list[tuple[int, str, float]]]
     stopwatch: Stopwatch
     step: int
 
     def policy(self, agent: int) -> Policy:
-        """A frozen copy of an agent as it is now."""
+        """An agent as it is now."""
 
 
 def load(job: AgentJob, file: Path | None) -> Checkpoint | None:

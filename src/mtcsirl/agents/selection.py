@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import gymnasium
 import numpy as np
+import torch
 
 from mtcsirl.agents.jobs import AgentJob, gate_score
 from mtcsirl.agents.streams import Purpose
@@ -36,6 +37,13 @@ class Selection:
         score = gate_score(self._job, {name: float(np.mean([one[name] for one in episodes])) for name in shared})
         if self.score is None or score >= self.score:
             self.score, self.policy = score, policy
+
+    def other_than(self, last: Policy) -> bool:
+        """Whether the run leaves another policy than the last one: the same one is evaluated once."""
+        if self.policy is None:
+            return False
+        pairs = zip(self.policy.tensors().values(), last.tensors().values(), strict=True)
+        return not all(torch.equal(*pair) for pair in pairs)
 
 
 def trial_episodes(

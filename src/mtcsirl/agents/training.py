@@ -31,7 +31,7 @@ from mtcsirl.episodes.lockstep import TaskEnvironments, make_environments
 from mtcsirl.episodes.policy import Policy
 from mtcsirl.files import stop
 from mtcsirl.files.provenance import Stopwatch
-from mtcsirl.names import LAST
+from mtcsirl.names import DIVERGED, KEPT, LAST
 from mtcsirl.rewards.mixture import PolicyReward
 from mtcsirl.worlds.environments import ACTION_SIZE
 
@@ -155,9 +155,9 @@ class Training:
             gate_verdict(job.gate, stochastic_means(rows), job.cs_reward, job.settings.gates)
             for job, rows in zip(self.jobs, evaluations, strict=True)
         ]
-        others = [own if chosen.wanted else None for chosen, own in zip(self.selections, last, strict=True)]
-        for rows, more in zip(evaluations, self._evaluate(others, LAST), strict=True):
-            rows += more
+        others = [own if one.other_than(own) else None for one, own in zip(self.selections, last, strict=True)]
+        for one, rows, more in zip(self.selections, evaluations, self._evaluate(others, LAST), strict=True):
+            rows += more or [row | {KEPT: LAST} for row in rows if one.wanted]
         batch = tuple(job.label for job in self.jobs)
         frames = [pd.DataFrame(curve, columns=["step", "metric", "value"]) for curve in self.curves]
         return [
@@ -260,7 +260,7 @@ class Training:
             metrics = measure_episode(action, following, task_reward, bool(solved[agent]), seen)
             metrics |= {name: values[agent] for name, values in learner.items()}
             if diverged[agent]:
-                metrics["diverged"] = float(diverged[agent])
+                metrics[DIVERGED] = float(diverged[agent])
                 self._log(f"{self.jobs[agent].label}: the simulation diverged before step {self.step}")
             for name, value in metrics.items():
                 self._stop_at([] if np.isfinite(value) else [agent], f"the {name.replace('_', ' ')}")

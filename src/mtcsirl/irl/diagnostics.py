@@ -10,6 +10,7 @@ from torch import Tensor
 from mtcsirl.irl.discriminator import Batch, Discriminator
 from mtcsirl.irl.losses import cross_entropy
 from mtcsirl.irl.rollout import Flags, World
+from mtcsirl.names import DIVERGED
 from mtcsirl.transitions import RewardFunction, Transitions
 
 Row = dict[str, Any]
@@ -39,7 +40,7 @@ def episode_rows(world: World, rollout: Transitions, flags: Flags, first_step: i
             diverged = int(flags.diverged[part].sum())
             solved = bool(flags.success[part].any()) and not diverged
             measured = world.measure_episode(action[part], following[part], task_reward[part], solved)
-            measured |= {"diverged": float(diverged)} if diverged else {}
+            measured |= {DIVERGED: float(diverged)} if diverged else {}
             key = {"task": task, "target": target, "step": first_step + end}
             rows += [key | {"metric": metric, "value": value} for metric, value in measured.items()]
     return rows
