@@ -84,7 +84,7 @@ def test_readme_gives_the_planned_cost(name):
     assert hours == pytest.approx(core_hours, rel=0.2, abs=0.5), today
 
 
-STILL_WIDE = {"methods.md": 3}
+STILL_WIDE: dict[str, int] = {}
 """Documents with so many wide lines left; this may only shrink, and it ends empty."""
 
 
