@@ -8,7 +8,7 @@ SMOKE := --configfile config/smoke.yaml
 # the tools find each other, and every job finds `mtcsirl`, without an activated environment
 export PATH := $(CURDIR)/$(BIN):$(PATH)
 
-.PHONY: help setup replicate smoke quick test lint bench constraints
+.PHONY: help setup replicate smoke quick test lint bench audit constraints
 
 help:  ## print this list
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
@@ -45,6 +45,11 @@ lint: setup  ## formatting, lint and types, all of which must be clean
 bench: setup  ## measured ratios against stable-baselines3, stock Meta-World and imitation
 	sh benchmarks/imitation_environment.sh
 	python -m benchmarks
+
+audit:  ## look constraints.txt up in a database of known vulnerabilities; needs the network
+	$(PYTHON) -m venv build/audit
+	build/audit/bin/python -m pip install --quiet pip-audit
+	$(PYTHON) .ci/audit.py build/audit/bin/pip-audit constraints.txt
 
 constraints:  ## renew constraints.txt: the newest versions that pyproject.toml allows
 	rm -rf build/constraints

@@ -23,7 +23,7 @@ from stable_baselines3 import SAC
 from benchmarks.sides import Row, command, row, seconds
 from mtcsirl.agents.jobs import AgentJob
 from mtcsirl.agents.training import Training
-from mtcsirl.rewards.mixture import ground_truth
+from mtcsirl.rewards.adapter import ground_truth
 from mtcsirl.settings.runs import AgentRunSettings
 from mtcsirl.worlds.fast.identity import stock_environment
 

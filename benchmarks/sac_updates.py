@@ -73,7 +73,7 @@ def update_flops(minibatch: int, hidden: tuple[int, ...] = (256, 256)) -> float:
 
 
 def _ours(minibatch: int) -> Callable[[], None]:
-    learner, replay = FusedSac(1, SacSettings(), seeds=[0]), Replay(1, TRANSITIONS, seed=0)
+    learner, replay = FusedSac(1, SacSettings(), seeds=[0]), Replay([0], TRANSITIONS)
     for observation, action, following, reward in _transitions():
         replay.add(observation[None], action[None], following[None], np.array([reward]))
 

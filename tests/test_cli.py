@@ -88,7 +88,7 @@ def test_the_library_knows_neither_snakemake_nor_argparse(checkout: Path) -> Non
         (["figure", "99"], "invalid choice: '99'"),
         (["plan", "--target", "figure_99"], "unknown artefact 'figure_99'; allowed: table_1, "),
         (["learn-reward", "--method", "gail"], "unknown method 'gail'; allowed: mt_airl, "),
-        (["table", "2"], "evaluation.csv: this run is missing"),
+        (["table", "2"], "this run is missing"),
     ],
     ids=lambda value: " ".join(value[:4]) if isinstance(value, list) else "",
 )

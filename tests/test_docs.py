@@ -139,13 +139,22 @@ def test_every_interpretation_has_its_four_parts():
         assert "not yet run" not in entry, f"{name}: untested, and what is expected"
 
 
+def interpretations_in(text: str) -> set[str]:
+    """The interpretations that ``text`` names; ``"I64"`` in quotes is a type of numbers."""
+    return set(re.findall(r"(?<![\"'\w])I[1-9]\d?(?![\"'\w])", text))
+
+
+def test_a_type_of_numbers_is_no_interpretation():
+    assert interpretations_in('"I64": torch.int64, see I12 (and I7); BI3 I100') == {"I12", "I7"}
+
+
 def named() -> Iterator[tuple[Path, str]]:
     """(file, interpretation) wherever code, configuration or a document names one."""
     folders = ("src", "docs", "config", "workflow", "tests", "benchmarks")
     files = [file for folder in folders for file in sorted((CHECKOUT / folder).rglob("*"))]
     for file in [*files, CHECKOUT / "README.md"]:
         if file.suffix in {".py", ".md", ".yaml", ".smk", ".rst"} and file != Path(__file__):
-            for name in set(re.findall(r"\bI[1-9]\d?\b", file.read_text(encoding="utf-8"))):
+            for name in sorted(interpretations_in(file.read_text(encoding="utf-8"))):
                 yield file, name
 
 

@@ -39,7 +39,7 @@ def load_extensions(files: Iterable[str | Path]) -> None:
     """Run each file once per process; it adds to ``METHODS`` or ``COMMON_SENSE_REWARDS``.
 
     Raises:
-        UserError: a file is missing or fails.
+        UserError: a file is missing, fails or ends the program.
     """
     for file in files:
         if os.pathsep in str(file):
@@ -57,8 +57,13 @@ def load_extensions(files: Iterable[str | Path]) -> None:
         module = importlib.util.module_from_spec(spec)
         try:
             spec.loader.exec_module(module)
+        except SystemExit as error:
+            if error.__class__ is not SystemExit:  # a signal that ends this process
+                raise
+            raise UserError(f"extensions: {file}: ends the program (sys.exit); an extension must not") from error
         except Exception as error:
-            raise UserError(f"extensions: {file}: {type(error).__name__}: {error}") from error
+            says = " ".join(str(error).split())
+            raise UserError(f"extensions: {file}: {type(error).__name__}: {says}") from error
         sys.modules[module_name] = module
 
 

@@ -56,6 +56,6 @@ def test_experts_hold_until_a_share_of_their_budget():
         ]
     )
     own = expert_run(settings, "window-open", "velocity")
-    assert (own.held_share, own.held_until) == (0.1, own.steps // 2)
+    assert (own.held_share, own.held_until) == (0.1, 0.5)
     assert expert_run(settings, "push-back", "action_norm").held_share == 0.0
     assert expert_run(settings, "reach", "action_norm").held_share == 0.2

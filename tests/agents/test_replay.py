@@ -5,7 +5,8 @@ import pytest
 import torch
 
 from mtcsirl.agents.replay import Replay
-from mtcsirl.rewards.mixture import PolicyReward, RewardMixture, ground_truth
+from mtcsirl.rewards.adapter import ground_truth
+from mtcsirl.rewards.mixture import PolicyReward, RewardMixture
 from mtcsirl.worlds.environments import OBSERVATION_MAPS
 from tests.agents.made_up import random_transitions
 
@@ -21,7 +22,7 @@ def add(replay, step):
 
 
 def filled(steps, capacity=50):
-    replay = Replay(AGENTS, capacity, seed=0)
+    replay = Replay(range(AGENTS), capacity)
     for step in range(steps):
         add(replay, step)
     return replay
@@ -45,16 +46,18 @@ def test_latest_is_in_order_also_across_the_seam():
 
 def test_empty_memory_and_too_many_steps_are_errors():
     with pytest.raises(ValueError, match="empty"):
-        Replay(1, 5, seed=0).sample(3)
+        Replay([0], 5).sample(3)
     with pytest.raises(ValueError, match="last 9 of 5"):
         filled(5).latest(9)
 
 
 @pytest.mark.parametrize("steps", [30, 120])
 def test_restored_memory_draws_the_same(steps):
-    replay, restored = filled(steps), Replay(AGENTS, 50, seed=7)
+    replay, restored = filled(steps), Replay(range(AGENTS), 50)
     replay.sample(3)
-    restored.load_state_dict({name: tensor.clone() for name, tensor in replay.state_dict().items()})
+    for agent in range(AGENTS):
+        state = {name: tensor.clone() for name, tensor in replay.state_dict(agent).items()}
+        restored.load_state_dict(agent, state)
     for one in (replay, restored):
         add(one, 999)
     assert torch.equal(replay.sample(64).observation, restored.sample(64).observation)
@@ -74,7 +77,7 @@ def test_reward_of_every_sampled_row_is_the_mixture_computed_on_that_row():
     ]
     reward = PolicyReward(mixtures, "cpu")
     for step in range(300):
-        reward.curriculum.add(torch.full((4,), float(step >= 100)) * 6.0)
+        reward.alpha.add(torch.full((4,), float(step >= 100)) * 6.0)
     batch = random_transitions(4, 16)
     alpha = 6.0 * 200 / 256 / 10.0
     mapping = OBSERVATION_MAPS["mapped"]
@@ -98,15 +101,16 @@ def test_f_counts_only_for_agents_whose_warm_up_is_over():
         return transitions.action.sum(-1)
 
     reward = PolicyReward([RewardMixture(cs_weight=2.0, f=f)] * 2, "cpu")
-    reward.counts[0] = 0.0
+    reward.counts[0] = False
     batch = random_transitions(2, 8)
     torch.testing.assert_close(reward(batch)[0], batch.task_reward[0])
     torch.testing.assert_close(reward(batch)[1], batch.task_reward[1] + 2.0 * f(batch)[1])
-    reward.counts.zero_()
+    reward.counts[:] = False
     torch.testing.assert_close(reward(batch), batch.task_reward)
 
 
-def test_reward_shared_by_all_agents_is_computed_in_one_call():
+def test_reward_shared_by_all_agents_is_computed_for_one_after_the_other():
+    """The same network gives the same rows other bits when there are more of them."""
     shapes = []
 
     def f(transitions):
@@ -116,4 +120,4 @@ def test_reward_shared_by_all_agents_is_computed_in_one_call():
     batch = random_transitions(3, 8)
     reward = PolicyReward([RewardMixture(cs_weight=1.0, f=f)] * 3, "cpu")
     torch.testing.assert_close(reward(batch), batch.task_reward + batch.action.sum(-1))
-    assert shapes == [(3, 8, 4)]
+    assert shapes == [(1, 8, 4)] * 3

@@ -37,10 +37,12 @@ def draw(learner, agent, observation, noise):
     return action, density.sum(-1)
 
 
-def test_one_update_follows_the_gradients_of_the_losses():
+@pytest.mark.parametrize("count", [1, 2, 3, 5])
+def test_one_update_follows_the_gradients_of_the_losses(count):
     """Haarnoja et al. (2018), equations 5, 7 and 17, differentiated by autograd in float64."""
     settings = SacSettings(
         hidden_sizes=(8, 8),
+        critics=count,
         initial_temperature=0.2,
         policy_learning_rate=1e-3,
         critic_learning_rate=2e-3,
@@ -62,10 +64,10 @@ def test_one_update_follows_the_gradients_of_the_losses():
         with torch.no_grad():
             next_action, next_log_prob = draw(wrong, agent, following[agent], noise[agent, 1])
             inputs = torch.cat((following[agent], next_action), -1)
-            values = torch.stack([run(wrong.target_critics, c * agents + agent, inputs) for c in range(2)])
+            values = torch.stack([run(wrong.target_critics, c * agents + agent, inputs) for c in range(count)])
             target = reward[agent] + 0.99 * (values.amin(0)[:, 0] - 0.2 * next_log_prob)
         inputs = torch.cat((observation[agent], action[agent]), -1)
-        for critic in range(2):
+        for critic in range(count):
             q_value = run(critics, critic * agents + agent, inputs)[:, 0]
             loss = loss + 0.5 * (q_value - target).square().mean()
     (critic_gradient,) = torch.autograd.grad(loss, critics.parameters)
@@ -81,7 +83,7 @@ def test_one_update_follows_the_gradients_of_the_losses():
     for agent in range(agents):
         drawn, log_prob = draw(wrong, agent, observation[agent], noise[agent, 0])
         inputs = torch.cat((observation[agent], drawn), -1)
-        values = torch.cat([run(learner.critics, c * agents + agent, inputs) for c in range(2)], -1)
+        values = torch.cat([run(learner.critics, c * agents + agent, inputs) for c in range(count)], -1)
         loss = loss + (0.2 * log_prob - values.amin(-1)).mean()
         expected = 0.2 * torch.exp(-3e-3 * torch.sign(-log_prob.detach().mean() + 4.0))
         assert learner.temperature[agent].item() == pytest.approx(expected.item(), rel=1e-6)
@@ -93,21 +95,40 @@ def test_one_update_follows_the_gradients_of_the_losses():
     torch.testing.assert_close(metrics["actor_gradient_norm"], norms)
 
 
-@pytest.mark.parametrize("temperature", ["automatic", 0.7])
-def test_agents_in_one_program_learn_as_they_do_alone(small_sac, temperature):
-    settings = small_sac.model_copy(update={"temperature": temperature})
-    together = FusedSac(3, settings, seeds=[5, 6, 7])
-    alone = [FusedSac(1, settings, seeds=[seed]) for seed in (5, 6, 7)]
-    for step in range(20):
-        batch, noise = random_transitions(3, MINIBATCH, seed=step), noise_for(3, seed=step)
-        update(together, batch, noise)
-        for agent, learner in enumerate(alone):
-            update(learner, [tensor[agent : agent + 1] for tensor in batch], noise[agent : agent + 1])
-    for agent, learner in enumerate(alone):
-        own = {"rtol": 1e-4, "atol": 1e-5}
-        torch.testing.assert_close(together.actor.parameters[agent], learner.actor.parameters[0], **own)
-        torch.testing.assert_close(together.critics.parameters[agent::3], learner.critics.parameters, **own)
-        torch.testing.assert_close(together.temperature[agent], learner.temperature[0])
+def learned(settings, seeds, minibatch=MINIBATCH, updates=8):
+    """Seed -> everything that an agent has learned among others: state, metrics, actions."""
+    learner = FusedSac(len(seeds), settings, seeds=seeds)
+    batches = [[random_transitions(minibatch, seed=100 * seed + n) for seed in seeds] for n in range(updates)]
+    for batch in batches:
+        update(learner, [torch.stack(parts) for parts in zip(*batch, strict=True)])
+    seen = torch.stack([one.observation[0] for one in batches[0]])
+    acted = torch.stack([learner.act(seen) for _ in range(3)])
+    metrics = learner.metrics()
+    return {
+        seed: {name: tensor.clone() for name, tensor in learner.state_dict(agent).items()}
+        | {name: values[agent] for name, values in metrics.items()}
+        | {"acted": acted[:, agent]}
+        for agent, seed in enumerate(seeds)
+    }
+
+
+@pytest.mark.parametrize("hidden_sizes", [(16, 16), (33, 17), (64,), (256, 256)])
+@pytest.mark.parametrize("critics", [1, 2, 3, 5])
+@pytest.mark.parametrize("minibatch", [64, 50, 7])
+def test_agents_in_one_program_have_the_bits_that_they_have_alone(small_sac, hidden_sizes, critics, minibatch):
+    settings = small_sac.model_copy(update={"hidden_sizes": hidden_sizes, "critics": critics})
+    alone = {seed: learned(settings, [seed], minibatch)[seed] for seed in (5, 6, 7)}
+    for seeds in ([5, 6], [7, 5, 6]):
+        for seed, found in learned(settings, seeds, minibatch).items():
+            different = [name for name, tensor in found.items() if not torch.equal(tensor, alone[seed][name])]
+            assert not different, (seed, seeds)
+
+
+def test_a_fixed_temperature_couples_no_agents_either(small_sac):
+    settings = small_sac.model_copy(update={"temperature": 0.7})
+    alone, among = learned(settings, [5])[5], learned(settings, [6, 5])[5]
+    assert all(torch.equal(tensor, alone[name]) for name, tensor in among.items())
+    assert not torch.equal(alone["actor"], learned(settings, [6])[6]["actor"])
 
 
 def test_initial_weights_depend_on_the_agents_own_seed(small_sac):
@@ -153,13 +174,15 @@ def test_restored_learner_goes_on_with_the_same_bytes(small_sac):
     learner = FusedSac(2, small_sac, seeds=[0, 1])
     for step in range(3):
         update(learner, random_transitions(2, MINIBATCH, seed=step))
-    state = {name: tensor.clone() for name, tensor in learner.state_dict().items()}
-    restored = FusedSac(2, small_sac, seeds=[8, 9])
-    restored.load_state_dict(state)
+    restored = FusedSac(2, small_sac, seeds=[0, 1])
+    for agent in range(2):
+        state = {name: tensor.clone() for name, tensor in learner.state_dict(agent).items()}
+        restored.load_state_dict(agent, state)
     for one in (learner, restored):
         update(one, random_transitions(2, MINIBATCH, seed=9))
-    for name, tensor in learner.state_dict().items():
-        assert torch.equal(tensor, restored.state_dict()[name]), name
+    for agent in range(2):
+        for name, tensor in learner.state_dict(agent).items():
+            assert torch.equal(tensor, restored.state_dict(agent)[name]), name
     assert learner.updates == restored.updates == 4
     metrics = restored.metrics()
     assert all(torch.equal(value, metrics[name]) for name, value in learner.metrics().items())
@@ -190,3 +213,27 @@ def test_cuda_graph_computes_what_the_cpu_does(small_sac):
         update(on_cuda, [tensor.cuda() for tensor in batch], noise.cuda())
     difference = on_cpu.actor.parameters - on_cuda.actor.parameters.cpu()
     assert difference.norm() <= 1e-3 * on_cpu.actor.parameters.norm()
+
+
+@pytest.mark.parametrize("count", [1, 3, 5])
+def test_the_state_restores_any_number_of_critics(small_sac, count):
+    settings = small_sac.model_copy(update={"critics": count})
+    learner, restored = (FusedSac(1, settings, seeds=[3]) for _ in range(2))
+    for step in range(3):
+        update(learner, random_transitions(1, MINIBATCH, seed=step))
+    assert learner.state_dict(0)["critics"].shape[0] == count
+    restored.load_state_dict(0, {name: tensor.clone() for name, tensor in learner.state_dict(0).items()})
+    for one in (learner, restored):
+        update(one, random_transitions(1, MINIBATCH, seed=9))
+    assert all(torch.equal(tensor, restored.state_dict(0)[name]) for name, tensor in learner.state_dict(0).items())
+
+
+@pytest.mark.parametrize("name", ["actor", "critics", "target_critics", "metric_sums", "log_temperature"])
+def test_what_is_not_finite_is_found_and_its_agent_named(small_sac, name):
+    learner = FusedSac(3, small_sac, seeds=[0, 1, 2])
+    update(learner, random_transitions(3, MINIBATCH))
+    assert learner.broken_agents() == {}
+    learner.state_dict(1)[name][0] = float("inf") if name == "actor" else float("nan")
+    if name in ("target_critics", "log_temperature"):
+        update(learner, random_transitions(3, MINIBATCH))
+    assert list(learner.broken_agents()) == [1]

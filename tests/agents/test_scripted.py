@@ -52,10 +52,10 @@ def test_success_of_the_script_does_not_end_a_warm_up(small_run):
         update={"warm_up_success": 0.5, "warm_up_episodes": 1, "warm_up_steps": 300, "scripted_steps": 100}
     )
     training = Training([AgentJob("push-back", 0, 100, settings)], log=lambda line: None)
-    for step, counts in ((100, 0.0), (150, 1.0)):
+    for step, counts in ((100, False), (150, True)):
         training.step = step
         training._end_warm_up(np.array([True]))
-        assert training._reward.counts.tolist() == [counts]
+        assert training.reward.counts.tolist() == [counts]
     training.close()
 
 

@@ -6,13 +6,13 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from mtcsirl.agents import training as training_module
+from mtcsirl.agents import resume
+from mtcsirl.agents import selection as selection_module
 from mtcsirl.agents.jobs import AgentJob, gate_score
 from mtcsirl.agents.training import Training, train_agents
 from mtcsirl.errors import UserError
-from mtcsirl.rewards.mixture import ground_truth
-
-WRITTEN = ("curve.csv", "evaluation.csv", "gate.json", "policy.json", "policy.safetensors")
+from mtcsirl.rewards.adapter import ground_truth
+from tests.agents.bytes import killed_at, run
 
 
 def expert(settings, seed=0, task="reach"):
@@ -30,16 +30,6 @@ def with_learner(settings, learner):
     return with_sac(settings, learner=learner, **(same if learner == "stable_baselines3" else {}))
 
 
-def run(jobs, folder, **options):
-    """Train and save; return the bytes of everything written."""
-    agents = train_agents(jobs, log=lambda line: None, **options)
-    for index, agent in enumerate(agents):
-        agent.save(folder / str(index))
-    return {
-        f"{index}/{name}": (folder / str(index) / name).read_bytes() for index in range(len(agents)) for name in WRITTEN
-    }
-
-
 @pytest.mark.parametrize("learner", ["fused", "stable_baselines3"])
 def test_training_twice_gives_the_same_bytes(small_run, tmp_path, learner):
     settings = with_learner(small_run, learner)
@@ -48,61 +38,52 @@ def test_training_twice_gives_the_same_bytes(small_run, tmp_path, learner):
     assert first != run([expert(settings, seed=1)], tmp_path / "other")
 
 
-class KilledError(Exception):
-    pass
-
-
 @pytest.mark.parametrize("learner", ["fused", "stable_baselines3"])
 @pytest.mark.parametrize("agents", [1, 2])
 def test_killed_run_resumes_to_the_same_bytes(small_run, tmp_path, learner, agents):
     settings = with_learner(small_run, learner)
     jobs = [expert(settings, seed) for seed in range(agents)]
     uninterrupted = run(jobs, tmp_path / "uninterrupted")
-
-    checkpoint = tmp_path / "checkpoint"
-    killed = Training(jobs, checkpoint=checkpoint, log=lambda line: None)
-    original = killed.environments.step
-
-    def step(action):
-        if killed.step == 225:
-            raise KilledError
-        return original(action)
-
-    killed.environments.step = step
-    with pytest.raises(KilledError):
-        killed.run()
-    killed.close()
-    assert checkpoint.is_file()
-
+    checkpoints = [tmp_path / f"checkpoint_{agent}" for agent in range(agents)]
+    killed_at(225, jobs, checkpoints)
+    assert all(file.is_file() for file in checkpoints)
     lines = []
-    agents_trained = train_agents(jobs, checkpoint=checkpoint, log=lines.append)
+    assert run(jobs, tmp_path / "resumed", checkpoints=checkpoints, log=lines.append) == uninterrupted
     assert lines[0] == "resumed at step 200"
-    for index, agent in enumerate(agents_trained):
-        agent.save(tmp_path / "resumed" / str(index))
-    resumed = {key: (tmp_path / "resumed" / key).read_bytes() for key in uninterrupted}
-    assert resumed == uninterrupted
-    assert not checkpoint.exists()
 
 
-def test_checkpoint_of_other_settings_is_not_resumed(small_run, tmp_path):
+def test_checkpoint_of_other_settings_or_code_is_not_resumed(small_run, tmp_path, caplog):
     checkpoint = tmp_path / "checkpoint"
-    first = Training([expert(small_run)], checkpoint=checkpoint, log=lambda line: None)
+    first = Training(
+        [dataclasses.replace(expert(small_run), made_from="code 1")], checkpoints=[checkpoint], log=lambda line: None
+    )
     first.run()
     first.close()
+    for job, code in ((expert(small_run, seed=3), "code 1"), (expert(small_run), "code 2")):
+        caplog.clear()
+        lines = []
+        train_agents([dataclasses.replace(job, made_from=code)], checkpoints=[checkpoint], log=lines.append)
+        assert "other settings, inputs or code; starting from the beginning" in caplog.text
+        assert not any("resumed" in line for line in lines)
+        first = Training(
+            [dataclasses.replace(expert(small_run), made_from="code 1")],
+            checkpoints=[checkpoint],
+            log=lambda line: None,
+        )
+        first.run()
+        first.close()
     lines = []
-    train_agents([expert(small_run, seed=3)], checkpoint=checkpoint, log=lines.append)
-    assert "other settings" in lines[0]
+    train_agents(
+        [dataclasses.replace(expert(small_run), made_from="code 1")], checkpoints=[checkpoint], log=lines.append
+    )
+    assert any("resumed" in line for line in lines)
 
 
-def test_damaged_checkpoint_is_one_line(small_run, tmp_path):
+def test_a_damaged_checkpoint_is_one_line_and_a_new_start(small_run, tmp_path, caplog):
     (tmp_path / "checkpoint").write_bytes(b"half")
-    with pytest.raises(UserError, match="checkpoint"):
-        train_agents([expert(small_run)], checkpoint=tmp_path / "checkpoint")
-
-
-def test_workers_change_nothing(small_run, tmp_path):
-    jobs = [expert(small_run, 0), expert(small_run, 1, "drawer-close")]
-    assert run(jobs, tmp_path / "here") == run(jobs, tmp_path / "workers", workers=2)
+    fresh = run([expert(small_run)], tmp_path / "fresh")
+    assert run([expert(small_run)], tmp_path / "run", checkpoints=[tmp_path / "checkpoint"]) == fresh
+    assert "checkpoint: damaged" in caplog.text
 
 
 def test_agents_in_lockstep_may_differ_in_reward_alone(small_run, tmp_path):
@@ -163,36 +144,38 @@ def test_cs_reward_counts_for_good_once_recent_episodes_succeed(small_run):
     counts = []
     for solved in ([True, False], [False, False], [False, False], [False, True]):
         training._end_warm_up(np.array(solved))
-        counts.append(training._reward.counts.tolist())
-    assert counts == [[0.0, 0.0], [1.0, 0.0], [1.0, 0.0], [1.0, 1.0]]
-    training._reward.counts.zero_()
+        counts.append(training.reward.counts.tolist())
+    assert counts == [[False, False], [True, False], [True, False], [True, True]]
+    training.reward.counts[:] = False
     training.step = 200
     training._end_warm_up(np.array([False, False]))
-    assert training._reward.counts.tolist() == [1.0, 1.0], "at the latest"
+    assert training.reward.counts.tolist() == [True, True], "at the latest"
     training.close()
     at_once = Training([expert(small_run)], log=lambda line: None)
-    assert at_once._reward.counts.tolist() == [1.0]
+    assert at_once.reward.counts.tolist() == [True]
     at_once.close()
 
 
 def test_killed_run_remembers_whose_warm_up_is_over(small_run, tmp_path):
     waiting = small_run.model_copy(update={"warm_up_success": 0.5, "warm_up_episodes": 2, "warm_up_steps": 200})
     jobs = [expert(waiting), expert(waiting, seed=1)]
-    killed = Training(jobs, checkpoint=tmp_path / "checkpoint", log=lambda line: None)
+    files = [tmp_path / "first", tmp_path / "second"]
+    killed = Training(jobs, checkpoints=files, log=lambda line: None)
     for solved in ([True, False], [True, False], [False, True]):
         killed._end_warm_up(np.array(solved))
-    killed._save(tmp_path / "checkpoint")
-    resumed = Training(jobs, checkpoint=tmp_path / "checkpoint", log=lambda line: None)
-    resumed._resume(tmp_path / "checkpoint")
-    assert resumed._reward.counts.tolist() == killed._reward.counts.tolist() == [1.0, 1.0]
-    assert resumed._recent == [[True, False], [False, True]]
+    killed.step = 100
+    resume.save(killed)
+    resumed = Training(jobs, checkpoints=files, log=lambda line: None)
+    resume.restore(resumed, lambda line: None)
+    assert resumed.reward.counts.tolist() == killed.reward.counts.tolist() == [True, True]
+    assert resumed.recent == [[True, False], [False, True]]
     for training in (killed, resumed):
         training.close()
 
 
 def test_best_policy_of_the_trials_is_kept(small_run, monkeypatch):
     scores = iter([(0.0, -0.5, 9.0), (1.0, -0.4, 5.0), (1.0, -0.9, 9.0)])
-    monkeypatch.setattr(training_module, "gate_score", lambda job, means: next(scores))
+    monkeypatch.setattr(selection_module, "gate_score", lambda job, means: next(scores))
     training = Training([expert(small_run)], log=lambda line: None)
     seen = []
     original = training._try_policies
@@ -203,10 +186,11 @@ def test_best_policy_of_the_trials_is_kept(small_run, monkeypatch):
 
     training._try_policies = try_policies
     training.run()
+    (kept,) = training.finish()
     training.close()
-    assert np.array_equal(training._kept(0).weights[0], seen[1].weights[0])
-    training.jobs[0] = dataclasses.replace(training.jobs[0], keep="last")
-    assert np.array_equal(training._kept(0).weights[0], seen[2].weights[0])
+    assert np.array_equal(kept.policy.weights[0], seen[1].weights[0])
+    (last,) = train_agents([dataclasses.replace(expert(small_run), keep="last")], log=lambda line: None)
+    assert np.array_equal(last.policy.weights[0], seen[2].weights[0])
 
 
 def test_gate_score_puts_success_first(small_run):

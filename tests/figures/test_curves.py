@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from mtcsirl.figures.curves import Series, counts, draw_curves, missing_note, summarise_curve
+from mtcsirl.figures.curves import Series, counts, curve_title, draw_curves, missing_note, summarise_curve, tasks_note
 from mtcsirl.figures.style import LOOKS, new_figure
 
 
@@ -62,6 +62,27 @@ def test_missing_runs_are_named():
     assert missing_note([series({("a", 0): [1.0, 1.0]}, [("a", 0)])]) == []
     many = series({("a", 0): [1.0, 1.0]}, [("a", seed) for seed in range(5)])
     assert missing_note([many]) == ["not there yet – SAC: 4 runs"]
+
+
+def test_tasks_behind_an_incomplete_mean_are_named():
+    """A mean over one of two tasks is not the mean over both."""
+    both = [(task, seed) for task in ("a", "b") for seed in (0, 1)]
+    line = [1.0, 1.0]
+    assert tasks_note([series(dict.fromkeys(both, line), both)]) == []
+    one = series({("a", 0): line, ("a", 1): line}, both)
+    assert tasks_note([one]) == ["mean over the tasks that are there – SAC: a"]
+    uneven = series({("a", 0): line, ("a", 1): line, ("b", 1): line}, both)
+    assert tasks_note([uneven]) == ["mean over the tasks that are there – SAC: a, b (not of every seed)"]
+    assert tasks_note([series({}, both)]) == [], "nothing there is no mean"
+    assert tasks_note([series({("a", 0): line}, [("a", 0), ("a", 1)])]) == [], "one task alone is no mean over tasks"
+
+
+def test_target_stands_in_the_title_and_on_no_curve():
+    axes = new_figure(2, 2).subplots()
+    draw_curves(axes, [series({("a", 0): [0.1, 0.8]}, [])], "velocity", 0.8)
+    assert [text.get_text() for text in axes.texts] == []
+    assert curve_title("velocity", 0.8) == "Velocity, target 0.8"
+    assert curve_title("action_norm", None) == "Action norm"
 
 
 def test_counts_differ_by_method():

@@ -6,7 +6,8 @@ import pandas as pd
 import pytest
 
 from mtcsirl.figures.diagnostics import CHANCE, caption, draw
-from mtcsirl.figures.style import SMOKE_NOTE, figure_bytes
+from mtcsirl.figures.style import figure_bytes
+from mtcsirl.results.notes import SMOKE_NOTE
 from mtcsirl.study.outputs import DIAGNOSTIC_COLUMNS
 
 MEMBERS = (("reach", 1), ("drawer-close", 2))

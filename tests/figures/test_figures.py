@@ -6,7 +6,8 @@ import pytest
 from mtcsirl.errors import UserError
 from mtcsirl.figures import FIGURES, figure_spec
 from mtcsirl.figures.data import FigureData
-from mtcsirl.figures.style import SMOKE_NOTE, figure_bytes
+from mtcsirl.figures.style import figure_bytes
+from mtcsirl.results.notes import SMOKE_NOTE
 from tests.figures.made_up import TARGETS
 
 CURVES = ("figure_2", "figure_3", "figure_4", "figure_5", "figure_s1", "figure_s2")
@@ -81,6 +82,16 @@ def test_missing_runs_are_named_and_the_rest_is_drawn(data):
     )
     assert "(a) not there yet – Transferred: reach-wall seed 2" in texts(figure)
     assert any(line.get_label() == "Transferred" for line in figure.axes[0].lines)
+
+
+def test_figure_3_names_the_tasks_of_an_incomplete_mean(data):
+    gone = (data.curves["stage"] == "transfer") & (data.curves["task"] != "push-back")
+    partial = FigureData(settings=data.settings, curves=data.curves[~gone], scores=data.scores, points=data.points)
+    assert "(b) mean over the tasks that are there – MT-CSIRL: push-back" in texts(
+        figure_spec("figure_3").draw(partial)
+    )
+    assert "mean over the tasks" not in texts(figure_spec("figure_3").draw(data))
+    assert "the unseen test task" in figure_spec("figure_3").caption(data), "the paper's shows one task"
 
 
 def test_task_of_each_figure_is_the_papers(data):

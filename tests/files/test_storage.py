@@ -67,8 +67,9 @@ def test_a_full_disk_leaves_the_old_file(tmp_path: Path, name: str, monkeypatch:
         raise OSError(errno.ENOSPC, "No space left on device")
 
     monkeypatch.setattr("os.fsync", full)
-    with pytest.raises(OSError, match="No space left"):
+    with pytest.raises(OSError, match="No space left") as caught:
         WRITERS[name](path)
+    assert caught.value.filename == str(path)
     assert path.read_text() == "old"
     assert [entry.name for entry in tmp_path.iterdir()] == ["file"], "no temporary file stays behind"
 

@@ -1,6 +1,7 @@
 """Logits and losses against numbers worked out by hand."""
 
 import math
+from dataclasses import replace
 
 import pytest
 import torch
@@ -8,11 +9,9 @@ import torch
 from mtcsirl.irl.discriminator import Batch, Discriminator
 from mtcsirl.irl.losses import (
     Adversarial,
-    GradientPenalty,
     InformationBottleneck,
     Pass,
     Points,
-    bottleneck_information,
     clamp_log_pi,
     cross_entropy,
     dual_step,
@@ -22,8 +21,9 @@ from mtcsirl.irl.losses import (
     interpolated_points,
     known_task_reward_logit,
 )
+from mtcsirl.irl.methods.base import penalised
 from mtcsirl.irl.methods.mt_csirl_lt import half_of_entire_reward_logit
-from mtcsirl.rewards.networks import Output, RewardNetwork
+from mtcsirl.rewards.networks import Output, RewardNetwork, bottleneck_information
 from mtcsirl.transitions import Transitions
 
 ONE = torch.ones(1, 1)
@@ -181,7 +181,8 @@ def test_penalised_loss_adds_weight_times_the_penalty_at_the_experts() -> None:
     network, batch = _network(), _batch(2, 16)
     plain = Adversarial(known_task_reward_logit)
     forward = Discriminator(network, plain, 1e-3, torch.Generator().manual_seed(0)).forward(batch)
-    extra = GradientPenalty(plain, 0.5, expert_points)(forward) - plain(forward)
+    extra = penalised(plain, 0.5, expert_points)(forward) - plain(forward)
+    assert penalised(plain, 0.0, expert_points) == plain
     expected = [0.5 * _penalty(_network(), forward.expert.inputs[t : t + 1].double()) for t in range(2)]
     assert extra.tolist() == pytest.approx(expected, rel=1e-3)
 
@@ -200,17 +201,18 @@ def test_interpolates_lie_between_expert_and_generator() -> None:
 
 def test_bottleneck_adds_beta_times_the_excess_of_the_mean_kl() -> None:
     network, batch = _network("bottleneck"), _batch(2, 16)
-    loss = InformationBottleneck(Adversarial(entire_reward_logit), constraint=0.5, beta=2.0, step=0.25)
+    plain = Adversarial(entire_reward_logit)
+    loss = replace(plain, bottleneck=InformationBottleneck(constraint=0.5, beta=2.0, step=0.25))
     forward = Discriminator(network, loss, 1e-3, torch.Generator().manual_seed(0)).forward(batch)
     kls = forward._replace(
         expert_output=forward.expert_output._replace(information=torch.tensor([[1.0, 3.0], [0.0, 0.0]])),
         generator_output=forward.generator_output._replace(information=torch.tensor([[4.0, 4.0], [0.0, 2.0]])),
     )
     # Mean KL of the two tasks: (2 + 4)/2 = 3 and (0 + 1)/2 = 0.5.
-    extra = loss(kls) - loss.inner(kls)
+    extra = loss(kls) - plain(kls)
     assert extra.tolist() == pytest.approx([2.0 * 2.5, 0.0], abs=1e-5)
     loss.after_update(kls)  # averaged over tasks 1.75: beta + 0.25 (1.75 - 0.5)
-    assert loss.metrics() == {"beta": pytest.approx(2.3125), "kl": pytest.approx(1.75)}
+    assert {name: value.item() for name, value in loss.state().items()} == pytest.approx({"beta": 2.3125, "kl": 1.75})
 
 
 def test_update_descends_the_sum_of_the_tasks_losses() -> None:

@@ -10,9 +10,11 @@ import torch
 
 from mtcsirl.episodes.lockstep import Outcome
 from mtcsirl.errors import UserError
+from mtcsirl.files.checkpoint import save_checkpoint
 from mtcsirl.files.storage import checksum
 from mtcsirl.irl.methods import METHODS
 from mtcsirl.irl.methods.base import Setup
+from mtcsirl.irl.resume import load_state, state
 from mtcsirl.irl.rollout import collect
 from mtcsirl.irl.run import CHECKPOINT, learn_reward, make_trainer
 from mtcsirl.irl.trainer import IrlTrainer
@@ -56,7 +58,6 @@ def test_every_method_trains_and_leaves_a_whole_run(method, demonstrations, tmp_
     diagnostics = pd.read_csv(tmp_path / "diagnostics.csv", keep_default_na=False)
     assert tuple(diagnostics.columns) == DIAGNOSTIC_COLUMNS
     assert set(diagnostics["discriminator"]) == {"", "f"} | ({"task"} if method == "mt_csirl_lt" else set())
-    assert not (tmp_path / CHECKPOINT).exists()
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -78,7 +79,7 @@ def test_generators_are_paid_by_the_reward_of_this_moment(demonstrations) -> Non
     trainer = _run(_trainer("mt_csirl", demonstrations, curriculum_maximum="task"), 2)
     sample = trainer.replay.sample(64)
     f = trainer.method.discriminators["f"].network
-    alpha = trainer.curriculum.weight()
+    alpha = trainer.alpha.curriculum.weight()
     latest = trainer.replay.latest(120).task_reward  # 120 steps, fewer than the window: all count
     torch.testing.assert_close(alpha, latest.mean(dim=1) / 10)
     centre = f(trainer.replay.latest(120)).mean(dim=1)
@@ -143,7 +144,7 @@ def test_the_curriculum_is_full_where_a_generator_earns_what_its_experts_do(demo
     experts = [pd.read_parquet(file)["task_reward"].mean() for file in demonstrations]
     expected = trainer.replay.latest(120).task_reward.mean(dim=1) / torch.tensor(experts, dtype=torch.float32)
     torch.testing.assert_close(trainer.alpha(), expected.clamp(max=1.0))
-    trainer.curriculum.add(torch.tensor([256 * experts[0], 0.0]))
+    trainer.alpha.add(torch.tensor([256 * experts[0], 0.0]))
     assert trainer.alpha()[0] == 1.0
 
 
@@ -162,7 +163,7 @@ def test_centred_rewards_average_zero_for_each_generator(demonstrations) -> None
 
 
 def _same(first: IrlTrainer, second: IrlTrainer) -> bool:
-    ours, theirs = first.state(), second.state()
+    ours, theirs = state(first), state(second)
     return ours.keys() == theirs.keys() and all(torch.equal(ours[name], theirs[name]) for name in ours)
 
 
@@ -186,7 +187,7 @@ def test_state_restores_before_at_and_after_the_end_of_the_warm_up(demonstration
         return _trainer("mt_csirl", demonstrations, warm_up_iterations=2, iterations=2)
 
     whole, stopped, resumed = _run(trainer()), _run(trainer(), stop), trainer()
-    resumed.load_state({name: tensor.clone() for name, tensor in stopped.state().items()})
+    load_state(resumed, {name: tensor.clone() for name, tensor in state(stopped).items()})
     assert _same(_run(resumed, 4 - stop), whole)
 
 
@@ -284,14 +285,12 @@ def test_same_seed_same_bytes_and_resume_ends_with_them(demonstrations, tmp_path
         assert checksum(whole / name) == checksum(stopped / name), name
 
 
-def test_a_checkpoint_of_other_settings_or_a_broken_one_is_not_taken_up(demonstrations, tmp_path, monkeypatch) -> None:
+def test_a_checkpoint_of_other_settings_or_a_broken_one_is_not_taken_up(demonstrations, tmp_path) -> None:
     whole = tmp_path / "whole"
     learn_reward(whole, "mt_csirl", "velocity", demonstrations, 100, irl_settings())
     other = _run(_trainer("mt_csirl", demonstrations), 1)
-    from mtcsirl.irl import run
-
     for name, write in {
-        "other": lambda path: run.write_tensors(path, other.state() | run._rows_to_tensors(other, "another run")),
+        "other": lambda path: save_checkpoint(path, state(other), {"curve": other.curve}, run="another run"),
         "broken": lambda path: path.write_bytes(b"half a file"),
     }.items():
         folder = tmp_path / name
@@ -341,7 +340,8 @@ class _Counting:
 
 def test_rollouts_reset_every_episode_and_hand_on_every_step() -> None:
     seen = []
-    success = collect(_Counting(), lambda o: 10.0 + o, 5, 3, lambda *step: seen.append(step))
+    success, diverged = collect(_Counting(), lambda o: 10.0 + o, 5, 3, lambda *step: seen.append(step))
+    assert (diverged != success).all()
     assert success.tolist() == [[False, True, False, False, True], [False] * 5]
     assert [float(observation[0, 0]) for observation, _, _ in seen] == [0, 1, 2, 0, 1]
     assert [float(action[1, 0]) for _, action, _ in seen] == [10, 11, 12, 10, 11]
@@ -360,6 +360,6 @@ def test_scripted_rollouts_belong_to_the_warm_up_and_to_no_discriminator(demonst
     for _ in range(4):
         trainer.iterate()
     steps = trainer.irl.steps_per_iteration
-    assert trainer._densities.generator().shape[1] == 2 * steps, "two of four rollouts were scripted"
+    assert trainer.densities.generator().shape[1] == 2 * steps, "two of four rollouts were scripted"
     assert made(scripted=10_000)._scripted.steps.max() == 3 * steps, "no longer than the warm-up"
     assert made(scripted=70, method="mt_airl")._scripted.steps.max() == 0, "it does not know the task"

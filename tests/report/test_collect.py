@@ -11,24 +11,22 @@ from mtcsirl.errors import UserError
 from mtcsirl.figures.style import figure_bytes, new_figure
 from mtcsirl.files import storage
 from mtcsirl.report.collect import collect
-from mtcsirl.report.markdown import parse_table
+from mtcsirl.report.measured import measured
 from mtcsirl.report.page import build_report
+from mtcsirl.results.notes import Note
 from mtcsirl.results.rows import ROW_COLUMNS, SCORE_COLUMNS
 from mtcsirl.settings import Settings
 from mtcsirl.study.design import ARTEFACTS, design
 from mtcsirl.study.outputs import OUTPUTS
+from mtcsirl.tables.grid import Column, Grid, Line
+from mtcsirl.tables.table import Table
 
-TABLE = """**Table 1.** Ratio to the
-target.
-
-| learned on | reach-wall | A\\|B |
-| :-- | --: | --: |
-| reach-wall | **0.91 ± 0.03, n=5** | – ‡5 |
-| paper | 0.91 | 0.43, outside [0.1, 0.2] |
-
-- scale desk; 5 seeds
-- ‡ missing agents
-"""
+TABLE = Table(
+    "table_1",
+    "Ratio to the target.",
+    Grid("learned on", (Column("ours", "A|B"), Column("paper", "A|B")), (Line("reach-wall", ("– ‡5", "0.91")),)),
+    (Note("scale", "scale desk; 5 seeds"), Note("mark", "‡ missing agents")),
+)
 PROVENANCE = {
     "commit": "abc123",
     "versions": {"torch": "2.13.0"},
@@ -60,8 +58,9 @@ def results(tmp_path_factory):
     storage.write_bytes(root / "results" / "tables" / "table_1.png", png)
     for name in ARTEFACTS:
         if name.startswith("table_"):
+            storage.write_json(root / "results" / "tables" / f"{name}.json", TABLE.as_json())
             for ending in ("md", "csv", "tex"):
-                storage.write_text(root / "results" / "tables" / f"{name}.{ending}", TABLE)
+                storage.write_text(root / "results" / "tables" / f"{name}.{ending}", TABLE.markdown())
         else:
             storage.write_bytes(root / "figures" / f"{name}.png", png)
             storage.write_bytes(root / "figures" / f"{name}.pdf", b"%PDF")
@@ -125,7 +124,7 @@ def test_links_lead_to_files(results):
     page = root / "results" / "report" / "index.html"
     storage.write_text(page, build_report(collect(settings, page)))
     links = [link for link in re.findall(r'href="([^"]+)"', page.read_text()) if not link.startswith(("#", "data:"))]
-    assert len(links) == 3 * 5 + 2 * 11 + 1
+    assert len(links) == 4 * 5 + 2 * 11 + 1
     for link in links:
         assert (page.parent / link).is_file(), link
 
@@ -134,7 +133,7 @@ def test_missing_artefact_is_an_error_unless_partial(results):
     settings, root = results
     storage.remove(root / "figures" / "figure_3.png")
     try:
-        with pytest.raises(UserError, match=r"figure_3\.png: not there; make it with `snakemake figure_3`"):
+        with pytest.raises(UserError, match=r"figure_3\.png: not there"):
             collect(settings, root / "page.html")
         data = collect(settings, root / "page.html", partial=True)
         assert [name for name, _ in data.missing] == ["figure_3"]
@@ -160,18 +159,34 @@ def test_deviations_are_those_of_the_settings():
     assert (minibatch.ours, minibatch.paper) == ("128 transitions", "500")
 
 
-def test_table_is_read_back_from_markdown():
-    table = parse_table(TABLE)
-    assert table.caption == "Ratio to the target."
-    assert table.head == ("learned on", "reach-wall", "A|B")
-    assert table.rows == (
-        ("reach-wall", "**0.91 ± 0.03, n=5**", "– ‡5"),
-        ("paper", "0.91", "0.43, outside [0.1, 0.2]"),
+def test_tables_are_read_as_data(results):
+    settings, root = results
+    assert collect(settings, root / "page.html").tables[0].table.as_json() == TABLE.as_json()
+
+
+@pytest.mark.parametrize("text", ["", "{}", "[]", '{"name": "table_1"}', "not json"])
+def test_a_foreign_table_is_named(results, text):
+    settings, root = results
+    path = root / "results" / "tables" / "table_1.json"
+    try:
+        storage.write_text(path, text)
+        with pytest.raises(UserError, match=r"table_1\.json") as caught:
+            collect(settings, root / "page.html")
+        assert "\n" not in str(caught.value)
+    finally:
+        storage.write_json(path, TABLE.as_json())
+
+
+def unit(cs_reward, value, low, high):
+    return {"cs_reward": cs_reward, "measure": {"name": "part closed", "value": value, "low": low, "high": high}}
+
+
+def test_what_a_claim_measured_is_one_line():
+    one = [unit("velocity", 0.84, 0.8, 0.88), unit("action_norm", 0.9, None, None)]
+    assert measured(one) == "part closed: velocity 0.84 [0.80, 0.88], action norm 0.90"
+    several = [unit("velocity", 0.6, 0.5, 0.7), unit("velocity", 0.8, 0.75, 0.93), unit("velocity", None, None, None)]
+    assert measured(several) == "part closed: velocity 0.60 to 0.80 [0.50, 0.93] (2 units)"
+    assert measured([unit("velocity", 0.051, -0.001, 0.06), unit("velocity", 0.049, 0.0, 0.07)]) == (
+        "part closed: velocity 0.05 [0.00, 0.07] (2 units)"
     )
-    assert table.notes == ("scale desk; 5 seeds", "‡ missing agents")
-
-
-@pytest.mark.parametrize("text", ["", "no table", "| a | b |\n| --: | --: |\n| 1 |\n"])
-def test_foreign_markdown_is_named(text):
-    with pytest.raises(UserError, match=r"table_9\.md: not a table in Markdown"):
-        parse_table(text, "table_9.md")
+    assert measured([unit("velocity", None, None, None)]) == measured([]) == measured([{}]) == "nothing measured yet"

@@ -2,17 +2,19 @@
 
 import itertools
 import re
+from base64 import b64encode
 from dataclasses import replace
+from hashlib import sha256
 from html.parser import HTMLParser
 
 import pytest
 
 from mtcsirl.claims.unit_text import COLUMNS
 from mtcsirl.report.page import build_report
-from tests.report.browser import CHROMIUM, inspect
-from tests.report.made_up import FIGURES, made_up_report
+from tests.report.browser import AXE_PLACES, CHROMIUM, audit, inspect
+from tests.report.made_up import FIGURES, TASKS, made_up_report
 
-SECTIONS = ["run", "claims", "tables", "figures", "gates", "deviations", "rerun"]
+SECTIONS = ["claims", "tables", "figures", "numbers", "gates", "run", "deviations", "rerun"]
 needs_chromium = pytest.mark.skipif(CHROMIUM is None, reason="chromium is not installed: apt-get install chromium")
 
 
@@ -57,10 +59,15 @@ def test_answers_in_order(page):
     ] == SECTIONS
 
 
-def test_is_one_file_without_scripts_or_network(page):
+def test_is_one_file_without_network_and_runs_its_own_script_alone(page):
     elements = Elements(page)
     assert not elements.open
-    assert not {"script", "iframe"} & {tag for tag, _ in elements.found}
+    assert "iframe" not in {tag for tag, _ in elements.found}
+    (script,) = re.findall(r"<script>(.*?)</script>", page, re.DOTALL)
+    allowed = re.search(r"script-src 'sha256-([^']+)'", page).group(1)
+    assert b64encode(sha256(script.encode()).digest()).decode() == allowed
+    assert not elements.attributes("script", "src")
+    assert not [name for _, attributes in elements.found for name in attributes if name.startswith("on")]
     addresses = elements.attributes("img", "src") + elements.attributes("link", "href")
     assert all(address.startswith("data:") for address in addresses)
     assert "http://" not in page
@@ -82,11 +89,21 @@ def test_numbers_of_the_run(page):
 def test_verdicts_are_counted_and_worded(page):
     for verdict in ("reproduced", "partially", "not reproduced", "inconclusive", "precondition not met", "not run"):
         assert f">{verdict}: 2</span>" in page
-        assert page.count(f">{verdict}</span>") == 2
+        assert page.count(f">{verdict}</span>") == 4, "once on the first screen, once above its numbers"
+
+
+def test_first_answers_what_holds(page):
+    """Verdict, sentence and interval of each claim stand before anything else."""
+    first = page.split('<section id="claims">')[1].split("</ol>")[0]
+    assert first.count("<li>") == 12
+    assert first.count("reach both targets with &lt;full&gt; success") == 12
+    assert first.count("velocity 0.03 [0.01, 0.05]") == 12
+    assert "<table" not in page.split("</ol>")[0]
 
 
 def test_numbers_behind_a_claim_stand_side_by_side(page):
     numbers = page.split('id="claim-C1"')[1].split("</table>")[0]
+    assert "<caption>C1" in numbers
     for text in (*COLUMNS.values(), "yes [0.77, 0.85]", "p &lt; 0.001", "12.1 [6.0, 18.2]"):
         assert text.replace("'", "&#39;") in numbers
 
@@ -95,10 +112,28 @@ def test_every_target_has_its_cost(page):
     assert "<dd>makes table_2: 3 of 4 runs, 90 min</dd>" in page
 
 
-def test_paper_stands_below_ours(page):
-    rows = re.findall(r"<tr[^>]*><th scope=\"row\">(.*?)</th>", page.split('id="table_1"')[1].split("</table>")[0])
-    assert rows[:3] == ["reach-wall", "95 % t-interval", "paper"]
-    assert "<td><strong>0.91 ± 0.03, n=5</strong></td>" in page
+def test_paper_stands_beside_ours(page):
+    table = page.split('id="table_1"')[1].split("</table>")[0]
+    assert re.findall(r"<tr[^>]*><th scope=\"row\">(.*?)</th>", table) == list(TASKS)
+    assert '<td><strong>0.91±0.03 (n=5) ∈ †1</strong></td><td class="paper">0.91±0.02</td>' in table
+    assert '<th scope="rowgroup" colspan="11">velocity, target τ = 0.8</th>' in table
+    assert table.count('scope="colgroup" colspan="2"') == len(TASKS)
+
+
+def test_notes_stand_where_their_kind_belongs(page):
+    article = page.split('id="table_1"')[1].split("</article>")[0]
+    beside, folded = article.split("<summary>Notes on Table 1 (1)</summary>")
+    for text in ('note scale">scale desk', 'note gap">incomplete', 'note mark">†'):
+        assert text in beside
+    assert "<li>The paper prints no spread.</li>" in folded
+    assert "sac.minibatch" not in article, "a section of its own has them all"
+    assert '1 setting differs from the paper&#39;s: <a href="#deviations">which</a>' in folded.replace("'", "&#39;")
+
+
+def test_every_table_leads_to_its_rows_and_its_command(page):
+    article = page.split('id="table_1"')[1].split("</article>")[0]
+    assert '<a href="../tables/table_1.csv">its rows (CSV)</a>' in article
+    assert "rerun: <code>snakemake --cores 2 table_1</code>" in article
 
 
 @pytest.mark.parametrize(("scale", "options"), [("smoke", "--configfile config/smoke.yaml "), ("desk", "")])
@@ -129,7 +164,7 @@ def test_heat_map_and_summary_show_where_they_exist():
     picture = replace(data.figures[0], name="claims_picture", caption="Twelve verdicts")
     heat_map = replace(picture, name="table_1_picture", caption="Ours and the paper's")
     page = build_report(replace(data, claims_picture=picture, tables=(replace(data.tables[0], picture=heat_map),)))
-    assert page.index("Which claims hold") < page.index("Twelve verdicts") < page.index('id="claim-C1"')
+    assert page.index('id="claims"') < page.index("Twelve verdicts") < page.index('id="tables"')
     assert page.index('id="table_1"') < page.index("Ours and the paper&#39;s") < page.index('id="figures"')
 
 
@@ -160,6 +195,9 @@ def test_loads_without_complaints(seen):
 @needs_chromium
 def test_every_figure_shows_and_has_a_text(seen):
     assert len(seen["pictures"]) == len(FIGURES)
+    assert len(seen["enlarge"]) == len(FIGURES), "each has a button of its own"
+    assert len(set(seen["enlarge"])) == len(FIGURES)
+    assert seen["enlarged"] == [True, True, False], "opens in full size with its text, and closes"
     for shows, text in seen["pictures"]:
         assert shows
         assert len(text) > 20
@@ -185,3 +223,32 @@ def test_headings_leave_no_level_out(seen):
     assert levels[0] == 1
     assert levels.count(1) == 1
     assert all(b - a <= 1 for a, b in itertools.pairwise(levels))
+
+
+@needs_chromium
+def test_tables_sort_within_their_sections(seen):
+    """By the column of coffee-button: 0.91 in its own row, 0.51 in that of reach-wall."""
+    printed = list(TASKS)
+    assert seen["sorted"] == [
+        ["none", *printed],
+        ["ascending", *printed],
+        ["descending", *printed[::-1]],
+        ["none", *printed],
+    ]
+
+
+AXE = next((path for path in AXE_PLACES if path.is_file()), None)
+
+
+@needs_chromium
+@pytest.mark.skipif(AXE is None, reason="axe-core is not there: npm install --no-save --ignore-scripts axe-core")
+@pytest.mark.parametrize("width", [1280, 390])
+def test_axe_finds_no_fault(page, width, tmp_path):
+    assert audit(page, width, tmp_path, AXE) == []
+
+
+@needs_chromium
+@pytest.mark.skipif(AXE is None, reason="axe-core is not there: npm install --no-save --ignore-scripts axe-core")
+def test_axe_finds_a_fault_that_is_there(page, tmp_path):
+    broken = page.replace('alt="', 'data-alt="').replace("--quiet: #565656", "--quiet: #bbbbbb")
+    assert {"image-alt", "color-contrast"} <= {fault.split(":")[0] for fault in audit(broken, 1280, tmp_path, AXE)}

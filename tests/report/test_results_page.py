@@ -6,6 +6,7 @@ from mtcsirl.cli import main
 from mtcsirl.figures.claims import claims_figure, limits_of
 from mtcsirl.files.storage import read_json, read_text, write_json
 from mtcsirl.report.results_page import results_page
+from mtcsirl.results.rows import evaluation_rows
 from mtcsirl.settings import Settings
 from mtcsirl.study.design import design
 from mtcsirl.tables import TABLES
@@ -77,6 +78,33 @@ def test_page_has_verdicts_tables_and_deviations_once(findings):
     assert page.count(f"sac.minibatch = {SETTINGS.sac.minibatch}") == 1
     assert all(f"### {title}" in page for title in ("Table 2", "Table 4", "C1: reproduced"))
     assert "| commit | abc |" in page
+    assert "Not run yet" not in page
+    assert "No run yet" not in page
+
+
+def test_page_of_nothing_is_short():
+    """It names what was not run, and does not spell out empty tables."""
+    nowhere = SETTINGS.model_copy(update={"results": "nowhere"})
+    nothing = judge(rows_of(as_the_paper_says).iloc[:0], scores().iloc[:0], SETTINGS)
+    tables = {
+        name: table(evaluation_rows(design(SETTINGS, name), nowhere, partial=True), SETTINGS)
+        for name, table in TABLES.items()
+    }
+    page = results_page(nothing, tables, SETTINGS, provenance={"commit": "abc"})
+    assert len(page.splitlines()) < 60
+    assert f"Not run yet: {', '.join(finding.name for finding in nothing)}." in page
+    assert "No run yet, or no part of this study: Table 1, Table 2, Table 3, Table 4." in page
+    assert "### Table 5" in page, "which needs no run"
+    assert "`mtcsirl deviations` prints them" in page
+
+
+def test_page_of_a_part_shows_that_part(findings):
+    """A claim that was judged keeps its numbers beside those that were not."""
+    nothing = judge(rows_of(as_the_paper_says).iloc[:0], scores().iloc[:0], SETTINGS)
+    page = results_page([findings[0], *nothing[1:]], {}, SETTINGS)
+    assert "### C1: reproduced" in page
+    assert "### C2" not in page
+    assert f"Not run yet: {', '.join(finding.name for finding in nothing[1:])}." in page
 
 
 def test_verbs_work_on_partial_and_refuse_missing_results(tmp_path, capsys):
@@ -94,7 +122,7 @@ def test_verbs_work_on_partial_and_refuse_missing_results(tmp_path, capsys):
     assert main(["table", "2", *settings, *output]) == 2
     complaint = capsys.readouterr().err.strip()
     assert complaint.count("\n") == 0
-    assert "evaluation.csv" in complaint
+    assert "this run is missing" in complaint
     assert main(["table", "2", "--partial", *settings, *output]) == 0
     assert "‡" in read_text(tmp_path / "out" / "table_2.md")
     assert main(["claims", "--partial", *settings, *output]) == 0

@@ -10,10 +10,12 @@ import numpy as np
 import pandas as pd
 
 from mtcsirl.files import storage
+from mtcsirl.files.identity import FILE, Record, checksums, dumps, result_files
 from mtcsirl.names import DIVERGED, KEPT, distance_metric
 from mtcsirl.results.rows import KEY, OK, POLICIES, ROW_COLUMNS, agents, metrics, run_key
 from mtcsirl.rewards.ground_truth import COMMON_SENSE_REWARDS
-from mtcsirl.study.runs import Demonstrations, Study
+from mtcsirl.settings import Settings
+from mtcsirl.study.runs import AnyRun, Demonstrations, Runs, identity_of
 
 Means = Callable[[dict[str, Any]], dict[str, float]]
 """Means of the metrics of an agent, from its key."""
@@ -32,7 +34,7 @@ def noise(agent: dict[str, Any], metric: str, policy: str) -> float:
     return crc32(text.encode()) / 2**31 - 1
 
 
-def evaluation(study: Study, means: Means, spread: float = 0.0) -> pd.DataFrame:
+def evaluation(study: Runs, means: Means, spread: float = 0.0) -> pd.DataFrame:
     """Rows as ``evaluation_rows`` gives them, every run present, value = mean (1 + spread x noise)."""
     keys, rows = _frame(study)
     centres = [complete(means(key)) for key in keys]
@@ -42,7 +44,7 @@ def evaluation(study: Study, means: Means, spread: float = 0.0) -> pd.DataFrame:
 
 
 @cache
-def _frame(study: Study) -> tuple[list[dict[str, Any]], pd.DataFrame]:
+def _frame(study: Runs) -> tuple[list[dict[str, Any]], pd.DataFrame]:
     """The keys of all agents, and their rows without values."""
     keys, rows = [], []
     for run in study:
@@ -78,13 +80,21 @@ def _frame(study: Study) -> tuple[list[dict[str, Any]], pd.DataFrame]:
     return keys, pd.DataFrame(rows)
 
 
-def write_demonstrations(run: Demonstrations, results: Path, *, passed: bool = True) -> None:
+def sign(run: AnyRun, settings: Settings) -> None:
+    """Sign whatever lies in the folder of ``run`` as what ``settings`` ask for."""
+    folder = Path(settings.results) / run.folder
+    record = Record(identity_of(run, settings), checksums(folder, result_files(folder)))
+    storage.write_text(folder / FILE, dumps(record))
+
+
+def write_demonstrations(run: Demonstrations, settings: Settings, *, passed: bool = True) -> None:
     """The gate of one expert's demonstrations."""
     gate = {"gate": "expert", "passed": passed, "success": 1.0 if passed else 0.6, "metric": 0.75}
-    storage.write_json(results / run.folder / "gate.json", gate)
+    storage.write_json(Path(settings.results) / run.folder / "gate.json", gate)
+    sign(run, settings)
 
 
-def write_run(run: Any, results: Path, means: Means, *, episodes: int = 2, passed: bool = True) -> None:
+def write_run(run: Any, settings: Settings, means: Means, *, episodes: int = 2, passed: bool = True) -> None:
     """The files of one run that evaluates agents."""
     rows, curve = [], []
     for agent in agents(run):
@@ -103,7 +113,8 @@ def write_run(run: Any, results: Path, means: Means, *, episodes: int = 2, passe
                 for i in range(episodes)
             ]
         curve += [own | {"step": step, "metric": "velocity", "value": values["velocity"]} for step in (500, 1000)]
-    folder = results / run.folder
+    folder = Path(settings.results) / run.folder
     storage.write_csv(folder / "evaluation.csv", pd.DataFrame(rows))
     storage.write_csv(folder / "curve.csv", pd.DataFrame(curve))
     storage.write_json(folder / "gate.json", {"gate": "expert", "passed": passed, "success": 1.0, "metric": 0.75})
+    sign(run, settings)

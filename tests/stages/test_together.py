@@ -1,10 +1,16 @@
 """Agents of a study in lockstep: what Snakemake would make, once, and shared between processes."""
 
+import dataclasses
+
 import pytest
 
+from mtcsirl.agents.finite import NotFiniteError
 from mtcsirl.episodes.policy import load_policy
+from mtcsirl.files.identity import FILE
 from mtcsirl.files.storage import locked, read_json
 from mtcsirl.settings.loading import load
+from mtcsirl.stages import together
+from mtcsirl.stages.agents import agent_task, train
 from mtcsirl.stages.collect_demonstrations import collect_demonstrations
 from mtcsirl.stages.learn_reward import Learning, learn_reward
 from mtcsirl.stages.together import job_of, train_together
@@ -42,7 +48,7 @@ def test_an_agent_is_trained_once_its_reward_is_there(settings, tmp_path):
         )
         assert read_json(tmp_path / run.folder / "settings.json") == run.settings(settings).model_dump(mode="json")
         load_policy(tmp_path / run.folder)
-        assert not list((tmp_path / run.folder).glob("*together*")), "no checkpoint is left behind"
+        assert not list((tmp_path / run.folder).glob("*checkpoint*")), "no checkpoint is left behind"
     inputs = read_json(tmp_path / transfer.folder / "provenance.json")["inputs"]
     assert set(inputs) == {"reward.safetensors", "reward.json"}
 
@@ -53,6 +59,36 @@ def test_agents_that_another_process_holds_are_left_to_it(settings, tmp_path):
         assert train_together(runs[:2], settings, tmp_path, log=lambda line: None) == 1
     assert not (tmp_path / runs[0].folder / "gate.json").exists()
     assert (tmp_path / runs[1].folder / "gate.json").exists()
+
+
+def test_a_batch_leaves_what_single_jobs_leave(settings, tmp_path):
+    runs = [run for run in design(settings) if run.stage in ("train_sac", "train_expert")][:3]
+    assert train_together(runs, settings, tmp_path / "together", log=lambda line: None) == len(runs)
+    for run in runs:
+        job, about, inputs = job_of(run, settings, tmp_path)
+        train(job, agent_task(run.stage, about, job, tmp_path / "alone" / run.folder, None, inputs))
+        for name in (*OUTPUTS[run.stage], FILE):
+            if name != "provenance.json":
+                pair = [(tmp_path / side / run.folder / name).read_bytes() for side in ("together", "alone")]
+                assert pair[0] == pair[1], (run.folder, name)
+
+
+def test_an_agent_that_leaves_the_finite_numbers_takes_no_other_with_it(settings, tmp_path, monkeypatch):
+    runs = [run for run in design(settings) if run.stage == "train_sac"][:3]
+    original = together.job_of
+
+    def broken(run, *arguments):
+        job, *others = original(run, *arguments)
+        sac = job.settings.sac.model_copy(update={"reward_scale": 1e38})
+        bad = dataclasses.replace(job, settings=job.settings.model_copy(update={"sac": sac}))
+        return (bad if run == runs[1] else job), *others
+
+    monkeypatch.setattr(together, "job_of", broken)
+    lines: list[str] = []
+    with pytest.raises(NotFiniteError, match=runs[1].task):
+        train_together(runs, settings, tmp_path, log=lines.append)
+    assert [(tmp_path / run.folder / "gate.json").is_file() for run in runs] == [True, False, True]
+    assert not (tmp_path / runs[1].folder / "policy.safetensors").exists()
 
 
 def test_batches_hold_no_more_than_asked(settings, tmp_path):

@@ -1,4 +1,4 @@
-"""The paper's tables: targets table_1 ... table_5, each as CSV, Markdown and LaTeX."""
+"""The paper's tables: targets table_1 ... table_5, each as CSV, JSON, Markdown and LaTeX."""
 
 TABLES = [name for name in ARTEFACTS if name.startswith("table_")]
 
@@ -31,6 +31,7 @@ for table in TABLES:
             shown_by(table),
         output:
             csv=f"<results>/tables/{table}.csv",
+            json=f"<results>/tables/{table}.json",
             markdown=report(
                 f"<results>/tables/{table}.md",
                 caption=f"../report/{table}.rst",

@@ -41,8 +41,15 @@ class AgentJob:
     keep: Literal["best", "last"] = "best"
     reward_id: str = ""
     """Tells learned rewards apart, for example a checksum: a run never resumes from a checkpoint of another reward."""
+    made_from: str = ""
+    """Hash of the run's identity: a run never resumes from a checkpoint of other code either."""
     inputs: Mapping[str, Path] = field(default_factory=dict)
     """Files that the job was made from, by name; provenance.json lists their checksums."""
+
+    @property
+    def label(self) -> str:
+        """The agent in a line to the user."""
+        return f"{self.task}-t{self.target} s{self.seed}"
 
     def mixture(self) -> RewardMixture:
         """The reward that this agent's policy is trained on."""
@@ -52,7 +59,7 @@ class AgentJob:
 
     def fingerprint(self) -> str:
         """Differs between jobs whose results may differ: the checkpoint of another job is not resumed."""
-        key = (self.task, self.target, self.seed, self.cs_reward, self.gate, self.keep, self.reward_id)
+        key = (self.task, self.target, self.seed, self.cs_reward, self.gate, self.keep, self.reward_id, self.made_from)
         return hashlib.sha256(repr((key, self.settings.model_dump_json())).encode()).hexdigest()
 
 
@@ -65,6 +72,8 @@ class TrainedAgent:
     curve: pd.DataFrame
     evaluation: list[Row]
     gate: dict[str, Any]
+    lockstep: tuple[str, ...] = ()
+    """Labels of all agents that trained beside it and of itself: where a number was made, no part of the number."""
 
     def save(self, folder: Path | str) -> None:
         """Write policy.safetensors, policy.json, curve.csv, evaluation.csv and gate.json."""
@@ -92,7 +101,7 @@ def shared_settings(jobs: Sequence[AgentJob]) -> AgentRunSettings:
     for job in jobs:
         if common_settings(job.settings) != first:
             raise UserError(
-                f"{job.task}-t{job.target} s{job.seed}: agents in lockstep share all settings but reward_scale, "
+                f"{job.label}: agents in lockstep share all settings but reward_scale, "
                 "cs_weight, curriculum, scripted_steps and held_share; train it on its own"
             )
     return jobs[0].settings

@@ -1,4 +1,10 @@
-"""Many small ReLU networks of one shape as one tensor program, with its backward pass written out."""
+"""Many small ReLU networks of one shape as one tensor program, with its backward pass written out.
+
+A network computes the same bits alone as among others. Libraries choose a kernel by where a matrix begins in memory and
+treat the last numbers of a vector differently, so every network's parameters and every slice of a workspace begin at a
+multiple of `ALIGNED` numbers; and the one product whose kernel depends on the number of networks, a single column for a
+single network, is computed twice (`_column`).
+"""
 
 from __future__ import annotations
 
@@ -7,6 +13,14 @@ from itertools import pairwise
 
 import torch
 from torch import Tensor
+
+ALIGNED = 32
+"""Numbers: two of the widest vectors (AVX-512, float32), which torch's loops take at a time."""
+
+
+def aligned(count: int) -> int:
+    """The least multiple of `ALIGNED` that holds `count` numbers."""
+    return -(-count // ALIGNED) * ALIGNED
 
 
 class Workspace:
@@ -18,11 +32,25 @@ class Workspace:
 
     def __init__(self, activations: list[Tensor]) -> None:
         self.activations = activations
-        self.deltas = [torch.empty_like(tensor, memory_format=torch.contiguous_format) for tensor in activations]
+        self.deltas = [_slices(tensor, *tensor.shape) for tensor in activations]
 
     def first_rows(self, rows: int) -> Workspace:
         """The same pass, for a backward pass through its first rows alone."""
         return Workspace([tensor[:, :rows] for tensor in self.activations])
+
+
+def _slices(like: Tensor, networks: int, rows: int, size: int) -> Tensor:
+    """Memory [G, rows, size] whose G slices are contiguous and aligned each."""
+    flat = like.new_empty(networks, aligned(rows * size))
+    return flat[:, : rows * size].view(networks, rows, size)
+
+
+def _column(bias: Tensor, inputs: Tensor, weight: Tensor, out: Tensor) -> None:
+    """bias + inputs weight of one network with one output, as two networks compute it: a lone one takes a kernel of
+    its own, which adds in another order."""
+    pair = [tensor.expand(2, -1, -1) for tensor in (bias, inputs, weight)]
+    both = _slices(out, 2, *out.shape[1:])
+    out.copy_(torch.baddbmm(*pair, out=both)[:1])
 
 
 class NetworkStack:
@@ -31,7 +59,7 @@ class NetworkStack:
     Layer l maps x_l to x_{l+1} = relu(x_l W_l^T + b_l), the last one without the ReLU.
 
     parameters, gradient: [G, P]; `weights[l]` [G, out, in] and `biases[l]` [G, 1, out] are views of them, so an
-    optimiser, a copy or an average of all networks is one operation on one tensor.
+    optimiser, a copy or an average of all networks is one operation on one tensor. What a row has beyond them is zero.
     """
 
     def __init__(
@@ -43,7 +71,7 @@ class NetworkStack:
     ) -> None:
         self.sizes = tuple(sizes)
         count = sum((fan_in + 1) * fan_out for fan_in, fan_out in pairwise(sizes))
-        self.parameters = torch.zeros(networks, count, device=device, dtype=dtype)
+        self.parameters = torch.zeros(networks, aligned(count), device=device, dtype=dtype)
         self.gradient = torch.zeros_like(self.parameters)
         self.weights, self.biases = self._views(self.parameters)
         self._transposed = [weight.transpose(1, 2) for weight in self.weights]
@@ -67,7 +95,7 @@ class NetworkStack:
 
     def workspace(self, minibatch: int) -> Workspace:
         """Memory for passes of this many rows per network."""
-        return Workspace([self.parameters.new_empty(len(self.parameters), minibatch, size) for size in self.sizes])
+        return Workspace([_slices(self.parameters, len(self.parameters), minibatch, size) for size in self.sizes])
 
     def forward(self, inputs: Tensor, workspace: Workspace) -> Tensor:
         """inputs [G, B, in] -> outputs [G, B, out]; the workspace keeps every layer for the backward pass."""
@@ -77,7 +105,10 @@ class NetworkStack:
         for layer, (weight, bias) in enumerate(zip(self._transposed, self.biases, strict=True)):
             if layer > 0:
                 activations[layer].relu_()
-            torch.baddbmm(bias, activations[layer], weight, out=activations[layer + 1])
+            if bias.numel() == 1:
+                _column(bias, activations[layer], weight, activations[layer + 1])
+            else:
+                torch.baddbmm(bias, activations[layer], weight, out=activations[layer + 1])
         return activations[-1]
 
     def backward(self, output_gradient: Tensor, workspace: Workspace) -> None:

@@ -1,12 +1,14 @@
 """stable-baselines3's SAC behind the interface of the fused learner: the reference in tests and benchmarks.
 
 Chosen by `sac.learner: stable_baselines3`. Rewards are relabelled on sampling here too: every update hands the
-relabelled minibatch to the model's replay buffer.
+relabelled minibatch to the model's replay buffer. The library draws from torch's global random numbers, so each model
+has a state of them of its own, which is put in place while it acts or learns.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, cast
 
 import gymnasium
@@ -18,6 +20,7 @@ from stable_baselines3.common.logger import Logger
 from stable_baselines3.common.type_aliases import ReplayBufferSamples
 from torch import Tensor
 
+from mtcsirl.agents.finite import broken_agents
 from mtcsirl.agents.networks import NetworkStack
 from mtcsirl.agents.sac import FusedSac
 from mtcsirl.episodes.policy import Policy
@@ -64,7 +67,10 @@ class ReferenceSac:
         self.agents, self.settings, self.updates = agents, settings, 0
         self.device = torch.device(settings.device if device is None else device)
         spaces = Spaces(observation_size, action_size)
-        self.models = [make_sb3(settings, spaces, seed, self.device) for seed in seeds]
+        self.models, self._random = [], []
+        for seed in seeds:
+            self.models.append(make_sb3(settings, spaces, seed, self.device))
+            self._random.append(torch.get_rng_state())
         self._view = FusedSac(
             1, settings, seeds=[0], observation_size=observation_size, action_size=action_size, device=self.device
         )
@@ -72,16 +78,34 @@ class ReferenceSac:
     @torch.no_grad()
     def act(self, observation: Tensor, deterministic: bool = False) -> Tensor:
         """Actions [A, 4] for observations [A, 39]."""
-        pairs = zip(self.models, observation, strict=True)
-        return torch.cat([model.actor(row[None], deterministic=deterministic) for model, row in pairs])
+        actions = torch.full((self.agents, self._view.action_size), torch.nan, device=self.device)
+        for agent, row in enumerate(observation):
+            with self._as(agent) as model:
+                actions[agent] = model.actor(row[None], deterministic=deterministic)
+        return actions
 
     def update(self, observation: Tensor, action: Tensor, reward: Tensor, next_observation: Tensor) -> None:
         """One gradient step of every model on its own minibatch [A, B, ...]."""
-        for agent, model in enumerate(self.models):
-            buffer = cast(RelabelledBuffer, model.replay_buffer)
-            buffer.hand_over(observation[agent], action[agent], reward[agent], next_observation[agent])
-            model.train(1, observation.shape[1])
+        for agent in range(self.agents):
+            with self._as(agent) as model:
+                buffer = cast(RelabelledBuffer, model.replay_buffer)
+                buffer.hand_over(observation[agent], action[agent], reward[agent], next_observation[agent])
+                model.train(1, observation.shape[1])
         self.updates += 1
+
+    @contextmanager
+    def _as(self, agent: int) -> Iterator[SAC]:
+        """A model with torch's random numbers where it left them.
+
+        The library refuses a policy that is not finite with an error of its own; ours is for who asks `broken_agents`.
+        """
+        torch.set_rng_state(self._random[agent])
+        try:
+            yield self.models[agent]
+        except ValueError:
+            if agent not in self.broken_agents():
+                raise
+        self._random[agent] = torch.get_rng_state()
 
     def fix_temperature(self, value: float) -> None:
         """Hold every model's temperature at `value` from now on."""
@@ -112,20 +136,28 @@ class ReferenceSac:
         """Only the temperature; the models' own logger is silent."""
         return {"temperature": self.temperature} if self.updates else {}
 
-    def state_dict(self) -> dict[str, Tensor]:
-        """Everything that an exact resume needs, with the state of torch's global random numbers."""
-        state = {"updates": torch.tensor(self.updates), "torch_random": torch.get_rng_state()}
+    def broken_agents(self) -> dict[int, str]:
+        """The agents of which a parameter is not finite, and of what."""
+        found: dict[int, str] = {}
         for agent, model in enumerate(self.models):
-            state |= {f"{agent}/{name}": tensor.detach() for name, tensor in _tensors(model).items()}
-        return state
+            parts = {
+                f"the parameter {name}": tensor.reshape(1, -1) for name, tensor in model.policy.state_dict().items()
+            }
+            parts["the temperature"] = _log_temperature(model).detach().reshape(1, 1)
+            found.update((agent, name) for name in broken_agents(parts).values())
+        return found
 
-    def load_state_dict(self, state: dict[str, Tensor]) -> None:
+    def state_dict(self, agent: int) -> dict[str, Tensor]:
+        """Everything that an exact resume of one agent needs."""
+        counts = {"updates": torch.tensor(self.updates), "torch_random": self._random[agent]}
+        return counts | {name: tensor.detach() for name, tensor in _tensors(self.models[agent]).items()}
+
+    def load_state_dict(self, agent: int, state: dict[str, Tensor]) -> None:
         """Restore what `state_dict` gave, in place."""
         self.updates = int(state["updates"])
-        for agent, model in enumerate(self.models):
-            for name, tensor in _tensors(model).items():
-                tensor.data.copy_(state[f"{agent}/{name}"])
-        torch.set_rng_state(state["torch_random"].cpu())
+        for name, tensor in _tensors(self.models[agent]).items():
+            tensor.data.copy_(state[name])
+        self._random[agent] = state["torch_random"].cpu().clone()
 
     def _show(self, agent: int) -> None:
         copy_from_sb3(self.models[agent], self._view)
@@ -154,7 +186,7 @@ def make_sb3(settings: SacSettings, spaces: gymnasium.Env, seed: int, device: to
         replay_buffer_class=RelabelledBuffer,
         ent_coef=f"auto_{settings.initial_temperature}" if automatic else float(settings.temperature),
         target_entropy="auto" if settings.target_entropy == "automatic" else settings.target_entropy,
-        policy_kwargs={"net_arch": list(settings.hidden_sizes)},
+        policy_kwargs={"net_arch": list(settings.hidden_sizes), "n_critics": settings.critics},
         seed=seed,
         device=device,
     )

@@ -2,7 +2,8 @@
 
 The algorithm and its order of operations are those of stable-baselines3 2.9 (temperature, critics, actor, target
 critics); a test holds the parameters of both against each other. Every tensor starts with the agent dimension A.
-No transition is terminal: Meta-World's episodes end by the time limit alone.
+No transition is terminal: Meta-World's episodes end by the time limit alone. An agent has the same bits alone and among
+others: its noise comes from streams of its own and no sum runs over agents.
 
 Source: Haarnoja et al., Soft Actor-Critic Algorithms and Applications, arXiv:1812.05905.
 """
@@ -11,21 +12,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from functools import reduce
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import torch
 from torch import Tensor
 
-from mtcsirl.agents.gaussian import (
-    SquashedSample,
-    squashed_log_prob,
-    squashed_sample,
-    squashed_sample_gradient,
-)
+from mtcsirl.agents.finite import broken_agents
+from mtcsirl.agents.gaussian import SquashedSample, squashed_log_prob, squashed_sample, squashed_sample_gradient
 from mtcsirl.agents.graph import CudaGraph
-from mtcsirl.agents.networks import NetworkStack, Workspace
+from mtcsirl.agents.networks import ALIGNED, NetworkStack, Workspace
 from mtcsirl.agents.optimiser import FlatAdam
+from mtcsirl.agents.streams import Purpose, Streams
 from mtcsirl.episodes.policy import Policy
 
 if TYPE_CHECKING:
@@ -37,8 +36,8 @@ _SUMMED = ("actor_loss", "critic_loss", "temperature", "entropy")
 class FusedSac:
     """A SAC agents with their own parameters, stepped together.
 
-    The twin critics of all agents are one stack of 2A networks: critic c of agent a is network c A + a.
-    Initial weights of agent a depend on seeds[a] alone; the noise of all agents comes from one generator.
+    The C critics of all agents are one stack of C A networks: critic c of agent a is network c A + a.
+    Initial weights and noise of agent a depend on seeds[a] alone.
     """
 
     def __init__(
@@ -65,33 +64,36 @@ class FusedSac:
         actor_sizes = (observation_size, *settings.hidden_sizes, 2 * action_size)
         critic_sizes = (observation_size + action_size, *settings.hidden_sizes, 1)
         self.actor = NetworkStack(agents, actor_sizes, **self._like)
-        self.critics = NetworkStack(2 * agents, critic_sizes, **self._like)
-        self.target_critics = NetworkStack(2 * agents, critic_sizes, **self._like)
+        self.critics = NetworkStack(settings.critics * agents, critic_sizes, **self._like)
+        self.target_critics = NetworkStack(settings.critics * agents, critic_sizes, **self._like)
         for agent, seed in enumerate(seeds):
             generator = torch.Generator().manual_seed(seed)
             self.actor.initialise(agent, generator)
-            self.critics.initialise(agent, generator)
-            self.critics.initialise(agents + agent, generator)
+            for critic in range(settings.critics):
+                self.critics.initialise(critic * agents + agent, generator)
         self.target_critics.parameters.copy_(self.critics.parameters)
 
         fixed = settings.temperature != "automatic"
         initial = float(settings.temperature) if fixed else settings.initial_temperature
-        self.log_temperature = torch.full((agents,), initial, **self._like).log_()
-        self._log_temperature_gradient = torch.zeros_like(self.log_temperature)
+        # One number of each row is used: all of it is aligned as networks are (agents/networks.py).
+        self._log_temperatures = torch.full((agents, ALIGNED), initial, **self._like).log_()
+        self._log_temperature_gradients = torch.zeros_like(self._log_temperatures)
+        self.log_temperature = self._log_temperatures[:, 0]
         self._optimisers = {
             "actor": FlatAdam(self.actor.parameters, self.actor.gradient, settings.policy_learning_rate),
             "critics": FlatAdam(self.critics.parameters, self.critics.gradient, settings.critic_learning_rate),
         }
         if not fixed:
             self._optimisers["temperature"] = FlatAdam(
-                self.log_temperature, self._log_temperature_gradient, settings.temperature_learning_rate
+                self._log_temperatures, self._log_temperature_gradients, settings.temperature_learning_rate
             )
 
         self.updates = 0
         self._metric_sums = torch.zeros(len(_SUMMED), agents, **self._like)
         self._metric_updates = 0
-        noise_seed = int(np.random.SeedSequence(list(seeds)).generate_state(1, np.uint64)[0] >> 1)
-        self._generator = torch.Generator(self.device).manual_seed(noise_seed)
+        self._seeds, self._acted = tuple(seeds), 0
+        self._action_noise = Streams(seeds, Purpose.ACTIONS, (action_size,), **self._like)
+        self._update_noise: dict[int, Streams] = {}
         self._programs: dict[int, Callable[..., None]] = {}
         self._workspaces: dict[tuple[str, int], Workspace] = {}
 
@@ -104,7 +106,8 @@ class FusedSac:
         mean, log_std = head.chunk(2, dim=-1)
         if deterministic:
             return torch.tanh(mean)
-        noise = torch.randn(mean.shape, generator=self._generator, **self._like)
+        noise = self._action_noise.draw(self._acted)
+        self._acted += 1
         return log_std.clamp(*self._log_std_bounds).exp_().mul_(noise).add_(mean).tanh_()
 
     @torch.no_grad()
@@ -136,12 +139,13 @@ class FusedSac:
         noise [A, 2, B, 4] standard normal, of the actions in s and in s'; drawn here if not given.
         """
         minibatch = observation.shape[1]
-        if noise is None:
-            shape = (self.agents, 2, minibatch, self.action_size)
-            noise = torch.randn(shape, generator=self._generator, **self._like)
         if minibatch not in self._programs:
             on_cuda = self.device.type == "cuda"
             self._programs[minibatch] = CudaGraph(self._gradient_step) if on_cuda else self._gradient_step
+            shape = (2, minibatch, self.action_size)
+            self._update_noise[minibatch] = Streams(self._seeds, Purpose.UPDATES, shape, **self._like)
+        if noise is None:
+            noise = self._update_noise[minibatch].draw(self.updates)
         self._programs[minibatch](observation, action, reward, next_observation, noise)
         self.updates += 1
         self._metric_updates += 1
@@ -164,7 +168,7 @@ class FusedSac:
     def _step_temperature(self, entropy: Tensor) -> None:
         """Loss -log(alpha) x mean(log pi + target entropy), whose gradient in log(alpha) is the entropy gap."""
         if "temperature" in self._optimisers:
-            torch.sub(entropy, self._target_entropy, out=self._log_temperature_gradient)
+            torch.sub(entropy, self._target_entropy, out=self._log_temperature_gradients[:, 0])
             self._optimisers["temperature"].step()
 
     def _step_critics(self, observation: Tensor, action: Tensor, target: Tensor) -> Tensor:
@@ -173,14 +177,14 @@ class FusedSac:
         minibatch = error.shape[-1]
         self.critics.backward((error / minibatch).view(-1, minibatch, 1), self._workspace("critics", minibatch))
         self._optimisers["critics"].step()
-        return error.square().mean(-1).sum(0).mul_(0.5)
+        return _added(error.square().mean(-1)).mul_(0.5)
 
     def _step_actor(self, observation: Tensor, sample: SquashedSample, temperature: Tensor) -> Tensor:
         """Loss mean(alpha log pi(a|s) - min_i Q_i(s, a)) with a drawn from the policy."""
         q_values = self._q_values(self.critics, observation, sample.action)
         minibatch = q_values.shape[-1]
-        first_is_less = q_values[0] <= q_values[1]
-        q_gradient = torch.stack((first_is_less, ~first_is_less)).to(q_values.dtype).mul_(-1.0 / minibatch)
+        least = q_values.argmin(0, keepdim=True)
+        q_gradient = torch.zeros_like(q_values).scatter_(0, least, -1.0 / minibatch)
         action_gradient = self.critics.input_gradient(
             q_gradient.view(-1, minibatch, 1),
             self._workspace("critics", minibatch),
@@ -188,7 +192,7 @@ class FusedSac:
         )
         head_gradient = squashed_sample_gradient(
             sample,
-            action_gradient.view(2, self.agents, minibatch, -1).sum(0),
+            _added(action_gradient.unflatten(0, (-1, self.agents))),
             (temperature / minibatch)[:, None, None],
         )
         self.actor.backward(head_gradient, self._workspace("actor in s", minibatch))
@@ -206,12 +210,11 @@ class FusedSac:
         return SquashedSample(*now), SquashedSample(*following)
 
     def _q_values(self, critics: NetworkStack, observation: Tensor, action: Tensor) -> Tensor:
-        """Q values [2, A, B] of both critics of every agent."""
+        """Q values [C, A, B] of the critics of every agent."""
         workspace = self._workspace("critics", observation.shape[1])
-        inputs = workspace.activations[0].view(2, *observation.shape[:2], -1)
-        inputs[0] = torch.cat((observation, action), dim=-1)
-        inputs[1] = inputs[0]
-        return critics.forward(workspace.activations[0], workspace).view(2, self.agents, -1)
+        inputs = workspace.activations[0].view(-1, *observation.shape[:2], workspace.activations[0].shape[-1])
+        inputs.copy_(torch.cat((observation, action), dim=-1))
+        return critics.forward(workspace.activations[0], workspace).view(-1, *observation.shape[:2])
 
     def _workspace(self, role: str, minibatch: int) -> Workspace:
         """The memory of a pass of so many rows: of the critics, of the actor learning, its first half, or acting."""
@@ -245,28 +248,49 @@ class FusedSac:
         self._metric_updates = 0
         return dict(zip(_SUMMED, means, strict=True)) | {
             "actor_gradient_norm": self.actor.gradient.norm(dim=1),
-            "critic_gradient_norm": self.critics.gradient.view(2, self.agents, -1).norm(dim=(0, 2)),
+            "critic_gradient_norm": _added(self._own(self.critics.gradient).norm(dim=-1).square()).sqrt(),
         }
 
-    def state_dict(self) -> dict[str, Tensor]:
-        """Everything that an exact resume needs, as named tensors (not copies)."""
-        state = {
+    def broken_agents(self) -> dict[int, str]:
+        """The agents of which a number is not finite, and what it is: looks at all parameters and all losses since the
+        last `metrics`, so nothing that was ever not finite escapes it."""
+        stacks = {"critics": self.critics, "actor": self.actor}
+        parts = {f"the {name}' parameters": self._own(stack.parameters) for name, stack in stacks.items()}
+        by_agent = {name: tensor.transpose(0, 1).flatten(1) for name, tensor in parts.items()}
+        losses = dict(zip(_SUMMED, self._metric_sums.unsqueeze(-1), strict=True))
+        return broken_agents({name.replace("_", " "): values for name, values in losses.items()} | by_agent)
+
+    def _own(self, rows: Tensor) -> Tensor:
+        """Rows [n A, P] of networks by network and agent [n, A, P]."""
+        return rows.view(-1, self.agents, rows.shape[-1])
+
+    def _tensors(self) -> dict[str, Tensor]:
+        """What learning changes, each [n, A, ...] (views)."""
+        tensors = {
             "actor": self.actor.parameters,
             "critics": self.critics.parameters,
             "target_critics": self.target_critics.parameters,
-            "log_temperature": self.log_temperature,
-            "metric_sums": self._metric_sums,
-            "counts": torch.tensor([self.updates, self._metric_updates]),
-            "generator": self._generator.get_state(),
+            "log_temperature": self._log_temperatures,
         }
         for name, optimiser in self._optimisers.items():
-            state.update({f"{name}_adam_{key}": tensor for key, tensor in optimiser.state().items()})
-        return state
+            tensors |= {f"{name}_adam_mean": optimiser.mean, f"{name}_adam_square": optimiser.square}
+        return {name: self._own(rows) for name, rows in tensors.items()} | {"metric_sums": self._metric_sums}
 
-    def load_state_dict(self, state: dict[str, Tensor]) -> None:
-        """Restore what `state_dict` gave, in place."""
-        self._generator.set_state(state["generator"].cpu())
-        self.updates, self._metric_updates = (int(count) for count in state["counts"])
-        for name, tensor in self.state_dict().items():
-            if name not in ("generator", "counts"):
+    def state_dict(self, agent: int) -> dict[str, Tensor]:
+        """Everything that an exact resume of one agent needs, alone or among others, as named tensors (not copies)."""
+        state = {name: rows[:, agent] for name, rows in self._tensors().items()}
+        state["counts"] = torch.tensor([self.updates, self._metric_updates, self._acted])
+        steps = {f"{name}_adam_steps": optimiser.steps for name, optimiser in self._optimisers.items()}
+        return state | steps
+
+    def load_state_dict(self, agent: int, state: dict[str, Tensor]) -> None:
+        """Restore what `state_dict` gave, in place; all agents have to come from the same step."""
+        self.updates, self._metric_updates, self._acted = (int(count) for count in state["counts"])
+        for name, tensor in self.state_dict(agent).items():
+            if name != "counts":
                 tensor.copy_(state[name])
+
+
+def _added(parts: Tensor) -> Tensor:
+    """The sum over the first dimension, term by term: a reduction may add in an order that depends on the shape."""
+    return reduce(torch.add, parts.unbind(0))

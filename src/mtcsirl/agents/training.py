@@ -1,7 +1,8 @@
 """The training loop of every agent that is not a generator: expert, baseline, transfer agent.
 
 One agent or many in lockstep: step, store, update on relabelled minibatches; at the end of an episode report, try the
-policy, save. A run that is killed resumes from its last checkpoint and ends with the bytes of one never killed.
+policy, save. A batch is invisible: an agent trained among others has the bytes of one trained alone. A run that is
+killed resumes from its last checkpoint, alone or among others, and ends with the bytes of one never killed.
 """
 
 from __future__ import annotations
@@ -14,18 +15,23 @@ import numpy as np
 import pandas as pd
 import torch
 
+from mtcsirl.agents import resume
+from mtcsirl.agents.finite import NotFiniteError, broken_rows, sac_settings
 from mtcsirl.agents.held import HeldExplorers
-from mtcsirl.agents.jobs import AgentJob, TrainedAgent, gate_score, shared_settings
+from mtcsirl.agents.jobs import AgentJob, TrainedAgent, shared_settings
 from mtcsirl.agents.learners import make_learner
 from mtcsirl.agents.progress import Progress
 from mtcsirl.agents.replay import Replay
 from mtcsirl.agents.scripted import ScriptedExplorers
-from mtcsirl.episodes.evaluation import measure_episode
+from mtcsirl.agents.selection import Selection, trial_episodes
+from mtcsirl.agents.streams import Purpose, Streams, uniform
+from mtcsirl.episodes.evaluation import Row, evaluate, measure_episode
 from mtcsirl.episodes.gates import gate_verdict, stochastic_means
 from mtcsirl.episodes.lockstep import TaskEnvironments, make_environments
 from mtcsirl.episodes.policy import Policy
-from mtcsirl.files import storage
-from mtcsirl.files.checkpoint import load_checkpoint, prefixed, save_checkpoint, without_prefix
+from mtcsirl.files import stop
+from mtcsirl.files.provenance import Stopwatch
+from mtcsirl.names import LAST
 from mtcsirl.rewards.mixture import PolicyReward
 from mtcsirl.worlds.environments import ACTION_SIZE
 
@@ -33,99 +39,139 @@ from mtcsirl.worlds.environments import ACTION_SIZE
 def train_agents(
     jobs: Sequence[AgentJob],
     *,
-    checkpoints: Sequence[Path] | None = None,
+    checkpoints: Sequence[Path | str] | None = None,
+    stopwatch: Stopwatch | None = None,
     log: Callable[[str], None] = print,
     events: Path | str | None = None,
     workers: int = 0,
 ) -> list[TrainedAgent]:
     """Train these agents in lockstep and evaluate them; one job is the ordinary case.
 
-    checkpoint: file to resume from and to save to; removed at the end. events: folder for TensorBoard event files.
-    workers: processes that step the environments and evaluate, 0 for none.
+    checkpoints: a file of each agent to resume from and to save to, which its run alone would write and take up too;
+    who saves the results removes them. Agents that have come equally far go on in lockstep, those of another step after
+    them. stopwatch: learns what earlier tries spent. events: folder for TensorBoard event files. workers: processes
+    that step the environments and evaluate, 0 for none.
 
-    Raises UserError when the jobs differ in more than task, target, seed, reward scale, cs_weight, curriculum or
-    scripted steps.
+    Raises:
+        UserError: the jobs differ in more than task, target, seed, reward scale, cs_weight, curriculum, scripted or
+            held actions.
+        NotFiniteError: a number is not finite any more; names the agents concerned, and the last checkpoints stay.
     """
-    checkpoint = checkpoints[0] if checkpoints else None
-    training = Training(jobs, checkpoint=checkpoint, log=log, events=events, workers=workers)
-    try:
-        training.run()
-        return training.finish()
-    finally:
-        training.close()
+    shared_settings(jobs)
+    files = [None] * len(jobs) if checkpoints is None else [Path(file) for file in checkpoints]
+    saved = [resume.load(job, file) for job, file in zip(jobs, files, strict=True)]
+    steps = [0 if found is None else int(found[1]["step"]) for found in saved]
+    trained: dict[int, TrainedAgent] = {}
+    for step in sorted(set(steps)):
+        own = [agent for agent, at in enumerate(steps) if at == step]
+        training = Training(
+            [jobs[i] for i in own],
+            checkpoints=[files[i] for i in own],
+            stopwatch=stopwatch,
+            log=log,
+            events=events,
+            workers=workers,
+        )
+        try:
+            resume.restore(training, [saved[i] for i in own], log)
+            training.run()
+            trained |= zip(own, training.finish(), strict=True)
+        except NotFiniteError as error:
+            error.agents = tuple(own[agent] for agent in error.agents)
+            raise
+        finally:
+            training.close()
+    return [trained[agent] for agent in range(len(jobs))]
 
 
 class Training:
-    """The state of one run of `train_agents`."""
+    """The state of agents that train in lockstep."""
 
     def __init__(
         self,
         jobs: Sequence[AgentJob],
         *,
-        checkpoint: Path | str | None = None,
+        checkpoints: Sequence[Path | None] | None = None,
+        stopwatch: Stopwatch | None = None,
         log: Callable[[str], None] = print,
         events: Path | str | None = None,
         workers: int = 0,
     ) -> None:
         self.jobs = list(jobs)
-        self.settings = shared_settings(self.jobs)
-        sac, seeds = self.settings.sac, [job.seed for job in jobs]
-        streams = np.random.SeedSequence(seeds).spawn(2)
-        self._random = np.random.default_rng(streams[0])
-        self.learner = make_learner(len(jobs), sac, seeds)
-        sampling_seed = int(streams[1].generate_state(1, np.uint32)[0])
-        self.replay = Replay(len(jobs), self.settings.steps, seed=sampling_seed, device=self.learner.device)
-        self._reward = PolicyReward([job.mixture() for job in jobs], self.learner.device)
-        if self.settings.warm_up_success > 0 and self.settings.warm_up_steps > 0:
-            self._reward.counts.zero_()
-        self._recent: list[list[bool]] = []
+        self.checkpoints = [None] * len(self.jobs) if checkpoints is None else list(checkpoints)
+        self.settings = settings = shared_settings(self.jobs)
+        seeds, own = [job.seed for job in jobs], [job.settings for job in jobs]
         self.step = 0
-        self._best: list[tuple[tuple[float, float, float], Policy] | None] = [None] * len(jobs)
-        self._curves: list[list[tuple[int, str, float]]] = [[] for _ in jobs]
-        self._checkpoint = None if checkpoint is None else Path(checkpoint)
+        self.learner = make_learner(len(jobs), settings.sac, seeds)
+        self.replay = Replay(seeds, settings.steps, device=self.learner.device)
+        self.reward = PolicyReward(
+            [job.mixture() for job in jobs],
+            self.learner.device,
+            window=settings.curriculum_window,
+            maximum=settings.curriculum_maximum,
+        )
+        if settings.warm_up_success > 0 and settings.warm_up_steps > 0:
+            self.reward.counts[:] = False
+        self.recent: list[list[bool]] = [[] for _ in jobs]
+        """Whether each agent's last episodes succeeded, as many as its warm-up looks at."""
+        self.selections = [Selection(job) for job in jobs]
+        self.curves: list[list[tuple[int, str, float]]] = [[] for _ in jobs]
         tasks = [(job.task, job.target) for job in jobs]
-        self.environments: TaskEnvironments = make_environments(tasks, self.settings.environment, workers)
+        self.environments: TaskEnvironments = make_environments(tasks, settings.environment, workers)
+        self._random_actions = Streams(seeds, Purpose.RANDOM_ACTIONS, (ACTION_SIZE,), uniform)
         self._scripted = ScriptedExplorers(
             [job.task for job in jobs],
             seeds,
-            [job.settings.scripted_steps for job in jobs],
-            [job.settings.scripted_noise for job in jobs],
-            self.settings.environment.observation,
+            [one.scripted_steps for one in own],
+            [one.scripted_noise for one in own],
+            settings.environment.observation,
         )
-        shares = [job.settings.held_share for job in jobs]
-        self._held = HeldExplorers(seeds, shares, self.settings.held_steps, self.settings.held_until)
-        self._progress = Progress(self.settings.steps, log, events)
+        until = int(settings.held_until * settings.steps)
+        self._held = HeldExplorers(seeds, [one.held_share for one in own], settings.held_steps, until)
+        self._progress = Progress(settings.steps, log, events)
+        self.stopwatch = stopwatch or Stopwatch()
         self._log = log
 
+    @stop.deferred()
     def run(self) -> None:
-        """Train until the budget ends, from the checkpoint if there is one."""
-        if self._checkpoint is not None and self._checkpoint.is_file():
-            self._resume(self._checkpoint)
+        """Train until the budget ends; stopped, it ends with its episode."""
         self._progress.start(self.step)
         while self.step < self.settings.steps:
             started = self.step
             self.episode()
-            last = self.step == self.settings.steps
-            if self.settings.progress.select_episodes > 0 and (
-                last or self._crossed(started, self.settings.progress.select_every)
-            ):
+            if self.step == self.settings.steps or self._crossed(started, self.settings.progress.select_every):
                 self._try_policies()
-            if self._checkpoint is not None and self._crossed(started, self.settings.progress.checkpoint_every):
-                self._save(self._checkpoint)
+            if stop.requested() or self._crossed(started, self.settings.progress.checkpoint_every):
+                resume.save(self)
+                if any(self.checkpoints):
+                    stop.stop_here(f"step {self.step}")
 
     def finish(self) -> list[TrainedAgent]:
         """Evaluate what was kept and judge it by the gates."""
-        policies = [self._kept(agent) for agent in range(len(self.jobs))]
-        keys = [(job.task, job.target, job.cs_reward, job.seed, job.settings) for job in self.jobs]
-        evaluations = self.environments.evaluate([(p, *key) for p, key in zip(policies, keys, strict=True)])
-        trained = []
-        for job, policy, rows, curve in zip(self.jobs, policies, evaluations, self._curves, strict=True):
-            gate = gate_verdict(job.gate, stochastic_means(rows), job.cs_reward, self.settings.gates)
-            frame = pd.DataFrame(curve, columns=["step", "metric", "value"])
-            trained.append(TrainedAgent(job, policy, frame, rows, gate))
-        if self._checkpoint is not None:
-            storage.remove(self._checkpoint)
-        return trained
+        last = [self.policy(agent) for agent in range(len(self.jobs))]
+        kept = [chosen.policy or own for chosen, own in zip(self.selections, last, strict=True)]
+        evaluations = self._evaluate(kept)
+        gates = [
+            gate_verdict(job.gate, stochastic_means(rows), job.cs_reward, job.settings.gates)
+            for job, rows in zip(self.jobs, evaluations, strict=True)
+        ]
+        others = [own if chosen.wanted else None for chosen, own in zip(self.selections, last, strict=True)]
+        for rows, more in zip(evaluations, self._evaluate(others, LAST), strict=True):
+            rows += more
+        batch = tuple(job.label for job in self.jobs)
+        frames = [pd.DataFrame(curve, columns=["step", "metric", "value"]) for curve in self.curves]
+        return [
+            TrainedAgent(*parts, lockstep=batch)
+            for parts in zip(self.jobs, kept, frames, evaluations, gates, strict=True)
+        ]
+
+    def _evaluate(self, policies: Sequence[Policy | None], *which: str) -> list[list[Row]]:
+        """The evaluation rows of a policy of each agent, none where there is no policy."""
+        arguments = [
+            None if policy is None else (policy, job.task, job.target, job.cs_reward, job.seed, job.settings, *which)
+            for policy, job in zip(policies, self.jobs, strict=True)
+        ]
+        return [rows or [] for rows in self.environments.each(evaluate, arguments)]
 
     def close(self) -> None:
         """Free the environments."""
@@ -136,47 +182,64 @@ class Training:
         return self.step // every > started // every
 
     def episode(self) -> None:
-        """Train through one episode of all agents, then report it."""
+        """Train through one episode of all agents, then report it.
+
+        Where a simulation diverges its agent starts over in the middle of the episode, which counts as failed.
+        """
         observation, started = self.environments.reset(), self.step
-        solved = np.zeros(len(self.jobs), dtype=bool)
+        solved, diverged = np.zeros(len(self.jobs), dtype=bool), np.zeros(len(self.jobs), dtype=int)
         end = min(self.settings.steps, started + self.settings.evaluation.episode_steps)
         while self.step < end:
             action = self._act(observation)
+            self._stop_at(broken_rows(action), "the action")
             outcome = self.environments.step(action)
-            self.replay.add(observation, action, outcome.next_observation, outcome.task_reward)
-            if self._reward.curriculum is not None:
-                self._reward.curriculum.add(torch.from_numpy(outcome.task_reward))
+            self._stop_at(broken_rows(outcome.task_reward), "the task reward")
+            self._stop_at(broken_rows(outcome.next_observation), "the observation")
+            self.replay.add(observation, action, outcome.next_observation, outcome.task_reward, outcome.diverged)
+            self.reward.alpha.add(torch.from_numpy(outcome.task_reward))
             observation = outcome.next_observation
             solved |= outcome.success
+            diverged += outcome.diverged
             self.step += 1
             self._update()
-        if outcome.diverged.any():
-            names = {self.jobs[agent].task for agent in np.flatnonzero(outcome.diverged)}
-            self._log(f"step {self.step}: the simulation diverged in {', '.join(sorted(names))}")
-        self._report(self.step - started, solved)
+        for agent, what in self.learner.broken_agents().items():
+            self._stop_at([agent], what)
+        solved &= diverged == 0
+        self._report(self.step - started, solved, diverged)
         self._end_warm_up(solved)
+
+    def _stop_at(self, agents: Sequence[int], what: str) -> None:
+        """End the run if any agent is concerned: nothing may be made of a number that is not finite.
+
+        Raises NotFiniteError.
+        """
+        if not agents:
+            return
+        job, file = self.jobs[agents[0]], self.checkpoints[agents[0]]
+        left = f"; {file} is from before" if file is not None and file.is_file() else ""
+        raise NotFiniteError(
+            f"{job.label}: {what} became non-finite at step {self.step} with {sac_settings(job.settings.sac)}, "
+            f"cs_weight {job.settings.cs_weight:g}: lower a learning rate or the reward's scale{left}",
+            agents,
+        )
 
     def _end_warm_up(self, solved: np.ndarray) -> None:
         """f counts, for good, for agents whose recent episodes succeeded often enough, and for all at the latest."""
-        if self.step >= self.settings.warm_up_steps:
-            self._reward.counts.fill_(1.0)
         own = solved & ~self._scripted.active(max(self.step - 1, 0))
-        self._recent = [*self._recent, own.tolist()][-self.settings.warm_up_episodes :]
-        if len(self._recent) == self.settings.warm_up_episodes:
-            share = torch.tensor(self._recent, dtype=torch.float32).mean(0)
-            self._reward.counts[share >= self.settings.warm_up_success] = 1.0
+        wanted, late = self.settings.warm_up_episodes, self.step >= self.settings.warm_up_steps
+        for agent, success in enumerate(own.tolist()):
+            recent = self.recent[agent] = [*self.recent[agent], success][-wanted:]
+            enough = len(recent) == wanted and sum(recent) / wanted >= self.settings.warm_up_success
+            self.reward.counts[agent] |= late or enough
 
     def _act(self, observation: np.ndarray) -> np.ndarray:
         if self.step < self.settings.sac.random_steps:
-            action = self._random.uniform(-1.0, 1.0, (len(self.jobs), ACTION_SIZE)).astype(np.float32)
+            action = 2.0 * self._random_actions.draw(self.step).numpy() - 1.0
         else:
-            action = self._policy_action(observation)
+            action = self.learner.act(torch.from_numpy(observation).to(self.learner.device)).cpu().numpy()
             self._held.replace(action, self.step)
         self._scripted.replace(action, observation, self.step)
         return action
-
-    def _policy_action(self, observation: np.ndarray) -> np.ndarray:
-        return self.learner.act(torch.from_numpy(observation).to(self.learner.device)).cpu().numpy()
 
     def _update(self) -> None:
         """Catch up with updates_per_step gradient steps per environment step after the random ones."""
@@ -184,99 +247,46 @@ class Training:
         due = int((self.step - sac.random_steps) * sac.updates_per_step)
         while self.learner.updates < due:
             batch = self.replay.sample(sac.minibatch)
-            self.learner.update(batch.observation, batch.action, self._reward(batch), batch.next_observation)
+            self.learner.update(batch.observation, batch.action, self.reward(batch), batch.next_observation)
 
-    def _report(self, steps: int, solved: np.ndarray) -> None:
+    def _report(self, steps: int, solved: np.ndarray, diverged: np.ndarray) -> None:
         """One curve row per agent and metric: the means of the episode that ends now, and the learner's."""
         episode = [tensor.cpu().numpy() for tensor in self.replay.latest(steps)]
         learner = {name: values.tolist() for name, values in self.learner.metrics().items()}
         measured = []
-        for agent, curve in enumerate(self._curves):
+        for agent, curve in enumerate(self.curves):
             _, action, following, task_reward = (array[agent] for array in episode)
             seen = self.settings.environment.observation
             metrics = measure_episode(action, following, task_reward, bool(solved[agent]), seen)
             metrics |= {name: values[agent] for name, values in learner.items()}
+            if diverged[agent]:
+                metrics["diverged"] = float(diverged[agent])
+                self._log(f"{self.jobs[agent].label}: the simulation diverged before step {self.step}")
+            for name, value in metrics.items():
+                self._stop_at([] if np.isfinite(value) else [agent], f"the {name.replace('_', ' ')}")
             curve += [(self.step, name, value) for name, value in metrics.items()]
             measured.append(metrics)
         self._progress.report(self.step, measured)
 
     def _try_policies(self) -> None:
-        """Keep the best policy of each agent, by trial episodes outside of the memory and by the last training ones."""
-        if all(job.keep == "last" for job in self.jobs):
-            return
-        trials = [self._trial() for _ in range(self.settings.progress.select_episodes)]
-        for agent, job in enumerate(self.jobs):
-            episodes = [trial[agent] for trial in trials] + self._training_episodes(agent)
-            means = {name: float(np.mean([one[name] for one in episodes])) for name in trials[0][agent]}
-            score, best = gate_score(job, means), self._best[agent]
-            if best is None or score >= best[0]:
-                self._best[agent] = (score, self._policy(agent))
+        """Keep the best policies, by trial episodes outside of the memory and by the last training ones."""
+        policies = [self.policy(agent) if one.wanted else None for agent, one in enumerate(self.selections)]
+        pairs = list(zip(self.selections, policies, strict=True))
+        wanted = [None if policy is None else one.trial(policy, self.step) for one, policy in pairs]
+        trials = self.environments.each(trial_episodes, wanted)
+        for agent, ((one, policy), episodes) in enumerate(zip(pairs, trials, strict=True)):
+            if policy is not None:
+                one.judge(policy, episodes + self._training_episodes(agent))
 
     def _training_episodes(self, agent: int) -> list[dict[str, float]]:
         """The metrics of the last training episodes that the agent's own policy acted in."""
         episodes: dict[int, dict[str, float]] = {}
-        for step, name, value in self._curves[agent]:
+        for step, name, value in self.curves[agent]:
             if not self._scripted.active(step - 1)[agent]:
                 episodes.setdefault(step, {})[name] = value
         wanted = self.settings.progress.select_training_episodes
         return list(episodes.values())[-wanted:] if wanted else []
 
-    def _trial(self) -> list[dict[str, float]]:
-        observation = self.environments.reset()
-        solved, taken, outcomes = np.zeros(len(self.jobs), dtype=bool), [], []
-        for _ in range(self.settings.evaluation.episode_steps):
-            taken.append(self._policy_action(observation))
-            outcomes.append(self.environments.step(taken[-1]))
-            observation = outcomes[-1].next_observation
-            solved |= outcomes[-1].success
-        following = np.stack([outcome.next_observation for outcome in outcomes], axis=1)
-        task_reward = np.stack([outcome.task_reward for outcome in outcomes], axis=1)
-        columns = zip(np.stack(taken, axis=1), following, task_reward, solved, strict=True)
-        return [measure_episode(*column, self.settings.environment.observation) for column in columns]
-
-    def _policy(self, agent: int) -> Policy:
+    def policy(self, agent: int) -> Policy:
+        """A frozen copy of an agent as it is now."""
         return replace(self.learner.policy(agent), observation=self.settings.environment.observation)
-
-    def _kept(self, agent: int) -> Policy:
-        best = self._best[agent]
-        return self._policy(agent) if best is None or self.jobs[agent].keep == "last" else best[1]
-
-    def _save(self, file: Path) -> None:
-        """Write everything that the rest of the run depends on; the environments start afresh at every episode."""
-        tensors = prefixed("learner", self.learner.state_dict()) | prefixed("replay", self.replay.state_dict())
-        if self._reward.curriculum is not None:
-            tensors |= prefixed("curriculum", self._reward.curriculum.state())
-        for agent, best in enumerate(self._best):
-            if best is not None:
-                tensors |= prefixed(f"best/{agent}", best[1].tensors())
-        notes = {
-            "jobs": [job.fingerprint() for job in self.jobs],
-            "step": self.step,
-            "random": self._random.bit_generator.state,
-            "recent": self._recent,
-            "counts": self._reward.counts.tolist(),
-            "curves": self._curves,
-            "scores": [None if best is None else best[0] for best in self._best],
-        }
-        save_checkpoint(file, tensors, notes)
-
-    def _resume(self, file: Path) -> None:
-        tensors, notes = load_checkpoint(file)
-        if notes["jobs"] != [job.fingerprint() for job in self.jobs]:
-            self._log(f"{file}: saved by a run with other settings; starting from the beginning")
-            return
-        self.learner.load_state_dict(without_prefix("learner", tensors))
-        self.replay.load_state_dict(without_prefix("replay", tensors))
-        if self._reward.curriculum is not None:
-            saved = without_prefix("curriculum", tensors)
-            for name, tensor in self._reward.curriculum.state().items():
-                tensor.copy_(saved[name])
-        for agent, score in enumerate(notes["scores"]):
-            if score is not None:
-                weights = without_prefix(f"best/{agent}", tensors)
-                self._best[agent] = (tuple(score), self._policy(agent).with_tensors(weights))
-        self.step, self._random.bit_generator.state = notes["step"], notes["random"]
-        self._recent = notes["recent"]
-        self._reward.counts.copy_(torch.tensor(notes["counts"]))
-        self._curves = [[(step, name, value) for step, name, value in curve] for curve in notes["curves"]]
-        self._log(f"resumed at step {self.step}")

@@ -35,7 +35,7 @@ def add_verb(
         formatter_class=argparse.RawDescriptionHelpFormatter,
         description=f"{does[0].upper()}{does[1:]}.\n\nneeds:  {needs}\nwrites: {writes}",
     )
-    verb.set_defaults(run=run, verb=name)
+    verb.set_defaults(run=run, verb=name, only_prints=writes == "nothing")
     return verb
 
 

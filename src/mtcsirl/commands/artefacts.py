@@ -10,15 +10,16 @@ from mtcsirl.commands.remedy import Verb, advised
 from mtcsirl.settings import Settings
 from mtcsirl.study.ablations import ABLATIONS
 from mtcsirl.study.artefacts import HEAT_MAPS, sign_artefact, unsign_artefact
-from mtcsirl.study.design import ARTEFACTS, design
-from mtcsirl.study.runs import Run
+from mtcsirl.study.design import ARTEFACTS, CLAIMS, design
+from mtcsirl.study.runs import IrlRun, Score
+from mtcsirl.study.standing import DONE, standing
 
 if TYPE_CHECKING:
     import pandas as pd
 
     from mtcsirl.claims.claims import Finding
 
-Kind = TypeVar("Kind", bound=Run)
+Kind = TypeVar("Kind", IrlRun, Score)
 
 
 def register(verbs: Verbs) -> None:
@@ -28,7 +29,7 @@ def register(verbs: Verbs) -> None:
         "table",
         _table,
         does="make one of the paper's tables",
-        writes="table_N.csv, .md, .tex (1, 3: .pdf, .png)",
+        writes="table_N.csv, .json, .md, .tex (1, 3: .pdf, .png)",
         numbered=True,
     )
     _add(verbs, "figure", _figure, does="draw one of the paper's figures", writes="figure_N.pdf, .png", numbered=True)
@@ -84,19 +85,18 @@ def _target(parsed: argparse.Namespace) -> str:
 
 
 def _table(parsed: argparse.Namespace) -> None:
-    from mtcsirl.files.storage import write_csv, write_text
+    from mtcsirl.files.storage import write_csv, write_json, write_text
     from mtcsirl.results.rows import evaluation_rows
     from mtcsirl.tables import TABLES
 
     settings = study_settings(parsed)
     name = f"table_{parsed.number}"
-    rows = evaluation_rows(
-        design(settings, name), settings.results, episodes=settings.evaluation.episodes, partial=parsed.partial
-    )
+    rows = evaluation_rows(design(settings, name), settings, partial=parsed.partial)
     table = TABLES[name](rows, settings)
     home = Path(settings.results) / "tables"
     folder = parsed.output or home
     write_csv(folder / f"{name}.csv", table.csv())
+    write_json(folder / f"{name}.json", table.as_json())
     write_text(folder / f"{name}.md", table.markdown())
     write_text(folder / f"{name}.tex", table.latex())
     if name in HEAT_MAPS:
@@ -117,7 +117,7 @@ def _figure(parsed: argparse.Namespace) -> None:
     name = f"figure_{parsed.number}"
     study = design(settings, name)
     readers = {"curves": curve_rows, "scores": score_rows, "points": point_rows}
-    frames = {what: read(study, settings.results, partial=parsed.partial) for what, read in readers.items()}
+    frames = {what: read(study, settings, partial=parsed.partial) for what, read in readers.items()}
     spec = figure_spec(name)
     data = FigureData(settings=settings, **frames)
     figure, caption = spec.draw(data), spec.caption(data)
@@ -139,11 +139,11 @@ def _sign(parsed: argparse.Namespace, settings: Settings, name: str, home: Path,
 
 
 def _reward_quality(parsed: argparse.Namespace) -> None:
-    from mtcsirl.figures.style import scale_notes
+    from mtcsirl.results.notes import scale_notes
     from mtcsirl.results.reward_quality import quality_markdown, read_quality
 
     settings = study_settings(parsed)
-    runs = _there(design(settings).scores, settings, "points.parquet", parsed.partial)
+    runs = _there(design(settings).scores, settings, parsed.partial)
     rows = read_quality(runs, settings.results, settings.score.bootstrap)
     text = quality_markdown(rows, " ".join(scale_notes(settings.scale)))
     home = Path(settings.results) / "scores"
@@ -152,11 +152,11 @@ def _reward_quality(parsed: argparse.Namespace) -> None:
 
 
 def _diagnostics(parsed: argparse.Namespace) -> None:
-    from mtcsirl.figures.style import scale_notes
     from mtcsirl.results.diagnosis import diagnoses_markdown, read_diagnoses
+    from mtcsirl.results.notes import scale_notes
 
     settings = study_settings(parsed)
-    runs = _there(design(settings).irl_runs, settings, "gate.json", parsed.partial)
+    runs = _there(design(settings).irl_runs, settings, parsed.partial)
     rows = read_diagnoses(runs, settings.results)
     text = diagnoses_markdown(rows, scale_notes(settings.scale))
     home = Path(settings.results) / "diagnostics"
@@ -164,9 +164,9 @@ def _diagnostics(parsed: argparse.Namespace) -> None:
     _sign(parsed, settings, "diagnostics", home, parsed.output or home)
 
 
-def _there(runs: tuple[Kind, ...], settings: Settings, name: str, partial: bool) -> tuple[Kind, ...]:
-    """All ``runs``; if ``partial``, those that have left their file ``name``."""
-    return tuple(run for run in runs if not partial or (Path(settings.results) / run.folder / name).is_file())
+def _there(runs: tuple[Kind, ...], settings: Settings, partial: bool) -> tuple[Kind, ...]:
+    """All ``runs``; if ``partial``, those that are done."""
+    return tuple(run for run in runs if not partial or standing(run, settings).state == DONE)
 
 
 def _write_summary(path: Path, rows: "pd.DataFrame", text: str) -> None:
@@ -186,10 +186,7 @@ def _ablation(parsed: argparse.Namespace) -> None:
 
     settings, name = study_settings(parsed), parsed.name
     shown = variants(settings, name)
-    frames = {
-        v: evaluation_rows(study, settings.results, episodes=settings.evaluation.episodes, partial=parsed.partial)
-        for v, study in shown.items()
-    }
+    frames = {v: evaluation_rows(study, settings, partial=parsed.partial) for v, study in shown.items()}
     rows = variant_rows(frames)
     home, figures = Path(settings.results) / "ablations", parsed.figures or Path(settings.figures)
     write_csv((parsed.output or home) / f"{name}.csv", rows)
@@ -217,19 +214,12 @@ def _claims(parsed: argparse.Namespace) -> None:
 
 
 def _judged(settings: Settings, partial: bool) -> "list[Finding]":
-    import pandas as pd
-
     from mtcsirl.claims.claims import judge
-    from mtcsirl.results.rows import ablated_generators, evaluation_rows, score_rows
-    from mtcsirl.study.design import variants
+    from mtcsirl.results.rows import evaluation_rows, score_rows
 
-    study, name = design(settings), "ablation_curriculum"
-    rows = evaluation_rows(study, settings.results, episodes=settings.evaluation.episodes, partial=partial)
-    without = ablated_generators(
-        variants(settings, name)["constant"], settings.results, name, episodes=settings.evaluation.episodes
-    )
-    scores = score_rows(study, settings.results, partial=partial)
-    return judge(pd.concat([rows, without], ignore_index=True), scores, settings)
+    runs = design(settings, CLAIMS)
+    rows = evaluation_rows(runs, settings, partial=partial)
+    return judge(rows, score_rows(runs, settings, partial=partial), settings)
 
 
 def _results(parsed: argparse.Namespace) -> None:
@@ -240,12 +230,7 @@ def _results(parsed: argparse.Namespace) -> None:
     from mtcsirl.tables import TABLES
 
     settings = study_settings(parsed)
-    rows = {
-        name: evaluation_rows(
-            design(settings, name), settings.results, episodes=settings.evaluation.episodes, partial=parsed.partial
-        )
-        for name in TABLES
-    }
+    rows = {name: evaluation_rows(design(settings, name), settings, partial=parsed.partial) for name in TABLES}
     tables = {name: table(rows[name], settings) for name, table in TABLES.items()}
     made = {"commit": commit(), **machine()}
     page = (parsed.output or Path("docs")) / "results.md"

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import multiprocessing
-from collections.abc import Sequence
+import signal
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from multiprocessing.connection import Connection
 from multiprocessing.shared_memory import SharedMemory
@@ -11,7 +12,7 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from mtcsirl.episodes.evaluation import Row, evaluate
+from mtcsirl.errors import UserError
 from mtcsirl.settings import EnvironmentSettings
 from mtcsirl.worlds.environments import ACTION_SIZE, OBSERVATION_SIZE, make_environment
 
@@ -19,7 +20,11 @@ TaskTarget = tuple[str, int]
 
 
 class Outcome(NamedTuple):
-    """One step of A environments: next observation [A, 39], task reward [A], success [A], diverged [A]."""
+    """One step of A environments: next observation [A, 39], task reward [A], success [A], diverged [A].
+
+    A simulation that diverged in this step has started over: its next observation is the first of a new episode, its
+    reward is 0 and it has no success, for what the step led to means nothing.
+    """
 
     next_observation: np.ndarray
     task_reward: np.ndarray
@@ -41,10 +46,13 @@ class Environments(Protocol):
 
 
 class TaskEnvironments(Environments, Protocol):
-    """Environments of Meta-World tasks, which can also be evaluated in."""
+    """Environments of Meta-World tasks, in which whole episodes can be run too."""
 
-    def evaluate(self, arguments: Sequence[tuple[Any, ...]]) -> list[list[Row]]:
-        """Call `mtcsirl.episodes.evaluation.evaluate` with each environment's arguments; the episodes of all follow."""
+    def each(self, function: Callable[..., Any], arguments: Sequence[tuple[Any, ...] | None]) -> list[Any]:
+        """Call `function(*own, reuse=environment)` for each environment, None for those without arguments.
+
+        `function` runs in the process of the environment: a function of a module, such as `evaluate`.
+        """
 
 
 def make_environments(tasks: Sequence[TaskTarget], settings: EnvironmentSettings, workers: int = 0) -> TaskEnvironments:
@@ -71,17 +79,21 @@ class LocalEnvironments:
         """Apply actions [A, 4]."""
         pairs = zip(self.environments, action, strict=True)
         observation, reward, _, _, info = zip(*(environment.step(row) for environment, row in pairs), strict=True)
-        return Outcome(
+        outcome = Outcome(
             np.stack(observation),
             np.array(reward, dtype=np.float32),
             np.array([one["success"] for one in info]),
             np.array([one["diverged"] for one in info]),
         )
+        for index in np.flatnonzero(outcome.diverged):
+            outcome.next_observation[index] = self.environments[index].reset()[0]
+            outcome.task_reward[index], outcome.success[index] = 0.0, False
+        return outcome
 
-    def evaluate(self, arguments: Sequence[tuple[Any, ...]]) -> list[list[Row]]:
-        """The evaluation rows of each environment's policy."""
+    def each(self, function: Callable[..., Any], arguments: Sequence[tuple[Any, ...] | None]) -> list[Any]:
+        """What `function` returns for each environment."""
         pairs = zip(self.environments, arguments, strict=True)
-        return [evaluate(*own, reuse=environment) for environment, own in pairs]
+        return [None if own is None else function(*own, reuse=environment) for environment, own in pairs]
 
     def close(self) -> None:
         """Free them."""
@@ -124,13 +136,13 @@ class WorkerEnvironments:
         observation, reward, success, diverged, _ = self._columns
         return Outcome(observation.copy(), reward[:, 0].copy(), success[:, 0] > 0, diverged[:, 0] > 0)
 
-    def evaluate(self, arguments: Sequence[tuple[Any, ...]]) -> list[list[Row]]:
-        """The evaluation rows of each environment's policy."""
+    def each(self, function: Callable[..., Any], arguments: Sequence[tuple[Any, ...] | None]) -> list[Any]:
+        """What `function` returns for each environment."""
         for pipe, rows in zip(self._pipes, self._rows, strict=True):
-            pipe.send_bytes(b"evaluate")
-            pipe.send([arguments[row] for row in rows])
+            pipe.send_bytes(b"each")
+            pipe.send((function, [arguments[row] for row in rows]))
         self._wait()
-        found: dict[int, list[Row]] = {}
+        found: dict[int, Any] = {}
         for pipe, rows in zip(self._pipes, self._rows, strict=True):
             found |= dict(zip(rows, pipe.recv(), strict=True))
         return [found[row] for row in range(len(arguments))]
@@ -153,6 +165,9 @@ class WorkerEnvironments:
     def _wait(self) -> None:
         for pipe in self._pipes:
             answer = pipe.recv_bytes().decode()
+            kind, _, text = answer.partition(": ")
+            if kind == UserError.__name__:
+                raise UserError(text)
             if answer != "done":
                 raise RuntimeError(f"an environment worker failed: {answer}")
 
@@ -169,6 +184,7 @@ def _serve(
     import torch
 
     torch.set_num_threads(1)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches every process; when to end is the trainer's to say
     memory = SharedMemory(name=name)
     columns = _columns(memory, len(tasks))
     try:
@@ -178,8 +194,8 @@ def _serve(
             answer = None
             if word == b"reset":
                 columns[0][rows] = environments.reset()
-            elif word == b"evaluate":
-                answer = environments.evaluate(pipe.recv())
+            elif word == b"each":
+                answer = environments.each(*pipe.recv())
             else:
                 outcome = environments.step(columns[4][rows])
                 columns[0][rows] = outcome.next_observation

@@ -8,7 +8,16 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from mtcsirl.figures.style import NO_RUNS, NOT_ASKED, TARGET_COLOUR, Look, empty_panel, quantity_label, step_axis
+from mtcsirl.figures.style import (
+    NO_RUNS,
+    NOT_ASKED,
+    TARGET_COLOUR,
+    Look,
+    empty_panel,
+    quantity,
+    quantity_label,
+    step_axis,
+)
 from mtcsirl.results.statistics import summarise, t_interval
 
 BINS = 40
@@ -63,7 +72,7 @@ def summarise_curve(rows: pd.DataFrame, bins: int = BINS) -> pd.DataFrame:
 
 
 def draw_curves(axes: Axes, series: Sequence[Series], metric: str, target: float | None) -> None:
-    """Draw each series with its interval and the target as a red line.
+    """Draw each series with its interval and the target as a red line; its value stands in the panel's title.
 
     The value axis follows means and target, not the intervals: with few seeds a t-interval can be many times the axis;
     it is then cut off at the frame.
@@ -86,11 +95,6 @@ def draw_curves(axes: Axes, series: Sequence[Series], metric: str, target: float
         heights.append(curve["mean"].max())
     if target is not None:
         axes.axhline(target, color=TARGET_COLOUR, linewidth=1)
-        axes.annotate(
-            f"target {target:g}", (1, target), xycoords=("axes fraction", "data"), xytext=(0, 2),
-            textcoords="offset points", ha="right", va="bottom", color=TARGET_COLOUR, fontsize=6.5,
-            bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.6, "pad": 0.5},
-        )  # fmt: skip
     axes.set_ylim(0, 1.2 * max(heights, default=1.0))
     axes.set_xlim(left=0)
     axes.set_ylabel(quantity_label(metric))
@@ -116,6 +120,23 @@ def missing_note(series: Sequence[Series]) -> list[str]:
         elif one.missing:
             parts.append(f"{one.label}: {_pairs(one.missing)}")
     return [f"not there yet – {'; '.join(parts)}"] if parts else []
+
+
+def tasks_note(series: Sequence[Series]) -> list[str]:
+    """One line that names over which tasks a series is a mean where those are not all that the study asks for."""
+    parts = []
+    for one in series:
+        there = list(dict.fromkeys(task for task, seed in one.expected if (task, seed) not in one.missing))
+        if one.missing and there and len({task for task, _ in one.expected}) > 1:
+            uneven = {(task, seed) for task in there for _, seed in one.expected} & set(one.missing)
+            parts.append(f"{one.label}: {', '.join(there)}{' (not of every seed)' if uneven else ''}")
+    return [f"mean over the tasks that are there – {'; '.join(parts)}"] if parts else []
+
+
+def curve_title(metric: str, target: float | None) -> str:
+    """As in "Velocity, target 0.8": a label at the line would cover the curves that reach it."""
+    name = quantity(metric).capitalize()
+    return name if target is None else f"{name}, target {target:g}"
 
 
 def _pairs(missing: Sequence[tuple[str, int]]) -> str:

@@ -3,7 +3,7 @@
 from matplotlib.figure import Figure
 
 from mtcsirl.figures import multi_task
-from mtcsirl.figures.curves import add_legend, counts, draw_curves, missing_note
+from mtcsirl.figures.curves import add_legend, counts, curve_title, draw_curves, missing_note, tasks_note
 from mtcsirl.figures.data import FigureData
 from mtcsirl.figures.scatter import draw_scatter, scatter_caption
 from mtcsirl.figures.style import (
@@ -31,8 +31,8 @@ def draw(data: FigureData) -> Figure:
     for index, metric in enumerate(metrics):
         series = multi_task.curve_series(data, metric)
         draw_curves(axes[index], series, metric, target_of(metric))
-        panel_title(axes[index], index, quantity(metric).capitalize())
-        notes += [f"({chr(ord('a') + index)}) {note}" for note in missing_note(series)]
+        panel_title(axes[index], index, curve_title(metric, target_of(metric)))
+        notes += [f"({chr(ord('a') + index)}) {note}" for note in missing_note(series) + tasks_note(series)]
     panel_title(axes[-1], len(metrics), "Rewards' correlation")
     draw_scatter(axes[-1], multi_task.correlation(data, _SCATTER), multi_task.METHOD, _SCATTER)
     add_legend(figure, list(axes[:-1]))
@@ -47,11 +47,20 @@ def caption(data: FigureData) -> str:
     numbers = "; ".join(f"{quantity(metric)}: {counts(multi_task.curve_series(data, metric))}" for metric in metrics)
     found = multi_task.correlation(data, _SCATTER)
     return (
-        f"Tasks that IRL has not seen ({', '.join(data.settings.multi_task.unseen_tasks)}), mean over them. "
+        f"{_tasks(data.settings.multi_task.unseen_tasks)} "
         f"{letters}: Expert maximises r_task and the true cs-reward, MT-CSIRL r_task and the reward "
         f"learned from {', '.join(data.settings.multi_task.train_tasks)}, SAC r_task alone; training episodes of the "
         "stochastic policy. Red line: target. Lines and bands: mean and 95 % t-interval over seeds "
         f"({numbers}); bands are cut off at the frame, curves end where the shortest run does. "
         f"({chr(ord('a') + len(metrics))}) {scatter_caption(found, _SCATTER)} "
         f"Scored on {data.settings.multi_task.unseen_tasks[0]}."
+    )
+
+
+def _tasks(unseen: tuple[str, ...]) -> str:
+    if len(unseen) == 1:
+        return f"The task {unseen[0]}, which IRL has not seen."
+    return (
+        f"Tasks that IRL has not seen ({', '.join(unseen)}), mean over them; a series that lacks runs is the mean over "
+        'those that are there. The paper\'s figure shows "the unseen test task", one that it does not name.'
     )

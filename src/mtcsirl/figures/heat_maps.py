@@ -7,7 +7,16 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.image import AxesImage
 
-from mtcsirl.figures.style import TEXT_WIDTH, add_notes, new_figure, panel_title, quantity, scale_notes, styled
+from mtcsirl.figures.style import (
+    NOT_ASKED,
+    TEXT_WIDTH,
+    add_notes,
+    new_figure,
+    panel_title,
+    quantity,
+    scale_notes,
+    styled,
+)
 from mtcsirl.results.published import Published, load_published
 from mtcsirl.settings import Settings
 from mtcsirl.tables.cross_transfer import baseline_cell, transfer_cell
@@ -53,7 +62,9 @@ def heat_map(cs_reward: str, rows: pd.DataFrame, settings: Settings, published: 
     figure.colorbar(image, ax=[left, right], shrink=0.8, label=f"{quantity(cs_reward)} / target")
     left.set_ylabel("reward learned on")
     notes = scale_notes(settings.scale)
-    add_notes(figure, notes + (["* fewer seeds than the study asks for"] if incomplete.any() else []))
+    notes += ["* fewer seeds than the study asks for"] if incomplete.any() else []
+    notes += [] if cs_reward in settings.cs_rewards else [NOT_ASKED]
+    add_notes(figure, notes)
     return figure
 
 

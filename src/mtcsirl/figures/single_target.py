@@ -3,7 +3,7 @@
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from mtcsirl.figures.curves import Series, add_legend, counts, draw_curves, missing_note
+from mtcsirl.figures.curves import Series, add_legend, counts, curve_title, draw_curves, missing_note
 from mtcsirl.figures.data import FigureData, rows_where
 from mtcsirl.figures.scatter import Correlation, draw_scatter, scatter_caption, select_correlation
 from mtcsirl.figures.style import (
@@ -71,7 +71,7 @@ def draw(data: FigureData, artefact: str, task: str, metrics: list[str], *, scat
         series = curve_series(data, artefact, task, metric)
         draw_curves(axes[index], series, metric, target_of(metric))
         _mark_warm_up(axes[index], warm_up_steps(data, task))
-        panel_title(axes[index], index, quantity(metric).capitalize())
+        panel_title(axes[index], index, curve_title(metric, target_of(metric)))
         notes += [f"({chr(ord('a') + index)}) {note}" for note in missing_note(series)]
     if scatter:
         panel_title(axes[-1], panels - 1, "Rewards' correlation")

@@ -15,11 +15,11 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from mtcsirl.names import AGENTS, QUANTITIES, Quantity, agent_label
+from mtcsirl.results.notes import scale_notes as scale_notes  # every drawing says it
 from mtcsirl.rewards.ground_truth import COMMON_SENSE_REWARDS
 
 TEXT_WIDTH = 5.5
 """Width of the paper's text in inches; figures are drawn at the size at which they are printed."""
-SMOKE_NOTE = "smoke scale: numbers mean nothing"
 NO_RUNS, NOT_ASKED = "no runs yet", "not part of this study"
 """Why a panel is empty."""
 TARGET_COLOUR = "#C00000"
@@ -135,11 +135,6 @@ def add_notes(figure: Figure, notes: Sequence[str]) -> None:
     if notes:
         figure.set_figheight(figure.get_figheight() + 0.14 * len(notes))
         figure.supxlabel("\n".join(notes), fontsize=6.5, color=NOTE_COLOUR)
-
-
-def scale_notes(scale: str) -> list[str]:
-    """The line that every smoke artefact carries."""
-    return [SMOKE_NOTE] if scale == "smoke" else []
 
 
 def step_axis(axes: Axes) -> None:

@@ -7,7 +7,7 @@ import platform
 import resource
 import subprocess
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -58,29 +58,40 @@ def _versions() -> dict[str, str]:
 
 
 class Stopwatch:
-    """Wall seconds, CPU seconds and peak memory since it was made; ``spent`` carries what earlier tries used."""
+    """Wall seconds, CPU seconds and peak memory of a run: since it was made, and of the tries before."""
 
-    def __init__(self, spent: dict[str, float] | None = None) -> None:
+    def __init__(self) -> None:
         self._wall = time.monotonic()
         self._cpu = time.process_time()
-        self._spent = spent or {"wall_seconds": 0.0, "cpu_seconds": 0.0}
+        self._before = {"wall_seconds": 0.0, "cpu_seconds": 0.0, "peak_memory_mib": 0.0}
+
+    def add(self, spent: Mapping[str, float]) -> None:
+        """Count what `read` gave an earlier try; a checkpoint carries it to the next."""
+        for name in ("wall_seconds", "cpu_seconds"):
+            self._before[name] += spent[name]
+        self._before["peak_memory_mib"] = max(self._before["peak_memory_mib"], spent["peak_memory_mib"])
 
     def read(self, agents: int = 1) -> dict[str, float]:
-        """The cost so far, resumed tries included; time is shared by ``agents`` runs."""
+        """The cost so far, earlier tries included; time is shared by ``agents`` runs."""
         peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
         return {
-            "wall_seconds": round((self._spent["wall_seconds"] + time.monotonic() - self._wall) / agents, 3),
-            "cpu_seconds": round((self._spent["cpu_seconds"] + time.process_time() - self._cpu) / agents, 3),
-            "peak_memory_mib": round(peak, 1),
+            "wall_seconds": round((self._before["wall_seconds"] + time.monotonic() - self._wall) / agents, 3),
+            "cpu_seconds": round((self._before["cpu_seconds"] + time.process_time() - self._cpu) / agents, 3),
+            "peak_memory_mib": round(max(peak, self._before["peak_memory_mib"]), 1),
         }
 
 
 def write_provenance(
-    folder: Path | str, stopwatch: Stopwatch, inputs: Mapping[str, Path] | None = None, *, agents: int = 1
+    folder: Path | str,
+    stopwatch: Stopwatch,
+    inputs: Mapping[str, Path] | None = None,
+    *,
+    agents: int = 1,
+    lockstep: Sequence[str] = (),
 ) -> None:
     """Write ``provenance.json`` into a run folder: commit, versions, machine, cost, checksums of the inputs.
 
-    ``agents``: how many runs the process made at once; each bears its share of the time.
+    ``agents``: how many runs the process made at once; each bears its share of the time. ``lockstep``: which they were.
     """
     write_json(
         Path(folder) / "provenance.json",
@@ -89,6 +100,7 @@ def write_provenance(
             "versions": _versions(),
             "machine": machine(),
             "cost": stopwatch.read(agents),
+            "lockstep": list(lockstep) if len(lockstep) > 1 else [],
             "inputs": {name: checksum(path) for name, path in sorted((inputs or {}).items())},
         },
     )

@@ -5,18 +5,19 @@ full disk leaves the old file or none, never half of one. Every reader turns a m
 one :class:`~mtcsirl.errors.UserError` that names it.
 """
 
-import fcntl
 import hashlib
 import json
 import os
 import tempfile
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
 from mtcsirl.errors import UserError
 from mtcsirl.files.identity import verify
+from mtcsirl.files.lock import is_locked as is_locked
+from mtcsirl.files.lock import locked as locked
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -25,19 +26,27 @@ if TYPE_CHECKING:
 
 @contextmanager
 def atomic(path: Path | str, mode: str = "w") -> Iterator[IO[Any]]:
-    """Open a temporary neighbour of ``path`` and rename it to ``path`` when the block ends without an error."""
+    """Open a temporary neighbour of ``path`` and rename it to ``path`` when the block ends without an error.
+
+    Raises OSError that names ``path`` when it cannot be written, for example on a full disk.
+    """
     path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
     temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+    text = "b" not in mode
     try:
-        text = "b" not in mode
+        path.parent.mkdir(parents=True, exist_ok=True)
         with open(temporary, mode, encoding="utf-8" if text else None, newline="" if text else None) as handle:
             yield handle
             handle.flush()
             os.fsync(handle.fileno())
         os.replace(temporary, path)
+    except OSError as error:
+        if error.errno is None or error.filename not in (None, str(temporary)):
+            raise
+        raise OSError(error.errno, os.strerror(error.errno), str(path)) from error
     finally:
-        temporary.unlink(missing_ok=True)
+        with suppress(OSError):
+            temporary.unlink()
 
 
 def _read(path: Path | str, parse: Callable[[Path], Any], what: str) -> Any:
@@ -165,7 +174,12 @@ def read_tensors(path: Path | str) -> "dict[str, torch.Tensor]":
 
 def checksum(path: Path | str) -> str:
     """SHA-256 of a file."""
-    return _read(path, lambda p: hashlib.sha256(p.read_bytes()).hexdigest(), "file")
+
+    def parse(p: Path) -> str:
+        with open(p, "rb") as handle:
+            return hashlib.file_digest(handle, "sha256").hexdigest()
+
+    return _read(path, parse, "file")
 
 
 def remove(path: Path | str) -> None:
@@ -204,27 +218,3 @@ def append_line(path: Path | str, line: str) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     with open(path, "a", encoding="utf-8") as handle:
         handle.write(line.rstrip("\n") + "\n")
-
-
-@contextmanager
-def locked(folder: Path | str) -> Iterator[Path]:
-    """Hold ``folder`` (made if missing) for one process: an orphan job cannot write beside its successor."""
-    folder = Path(folder)
-    folder.mkdir(parents=True, exist_ok=True)
-    with open(folder / ".lock", "w") as handle:
-        try:
-            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError as error:
-            raise UserError(f"{folder}: another process writes here; wait for it or stop it") from error
-        yield folder
-    (folder / ".lock").unlink(missing_ok=True)
-
-
-def is_locked(folder: Path | str) -> bool:
-    """Whether a process holds ``folder``; looks at the kernel's list, so that asking never gets in a job's way."""
-    lock, held = Path(folder) / ".lock", Path("/proc/locks")
-    try:
-        inode = lock.stat().st_ino
-        return any(line.split()[5].endswith(f":{inode}") for line in held.read_text().splitlines())
-    except FileNotFoundError:
-        return lock.exists()

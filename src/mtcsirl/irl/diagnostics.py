@@ -1,15 +1,15 @@
 """What to look at when IRL misbehaves: tidy rows of every iteration."""
 
 from collections.abc import Sequence
+from math import isfinite
 from typing import Any
 
-import numpy as np
 import torch
 from torch import Tensor
 
 from mtcsirl.irl.discriminator import Batch, Discriminator
 from mtcsirl.irl.losses import cross_entropy
-from mtcsirl.irl.rollout import World
+from mtcsirl.irl.rollout import Flags, World
 from mtcsirl.transitions import RewardFunction, Transitions
 
 Row = dict[str, Any]
@@ -24,22 +24,22 @@ def pearson(first: Tensor, second: Tensor) -> Tensor:
     return (first * second).sum(-1) / (first.norm(dim=-1) * second.norm(dim=-1))
 
 
-def episode_rows(
-    world: World, rollout: Transitions, success: np.ndarray, first_step: int, episode_steps: int
-) -> list[Row]:
-    """The curve's rows of one iteration: transitions [T, S] and success [T, S] in episodes of ``episode_steps``.
+def episode_rows(world: World, rollout: Transitions, flags: Flags, first_step: int, episode_steps: int) -> list[Row]:
+    """The curve's rows of one iteration: transitions [T, S] and flags [T, S] in episodes of ``episode_steps``.
 
-    ``first_step``: environment steps of each generator before it; an episode's row stands at its last step.
+    ``first_step``: environment steps of each generator before it; an episode's row stands at its last step. An episode
+    in which the simulation diverged has failed and says how often.
     """
     _, action, following, task_reward = (part.numpy() for part in rollout)
-    steps, rows = success.shape[1], []
+    steps, rows = flags.success.shape[1], []
     for start in range(0, steps, episode_steps):
         end = min(start + episode_steps, steps)
         for index, (task, target) in enumerate(world.members):
             part = index, slice(start, end)
-            measured = world.measure_episode(
-                action[part], following[part], task_reward[part], bool(success[part].any())
-            )
+            diverged = int(flags.diverged[part].sum())
+            solved = bool(flags.success[part].any()) and not diverged
+            measured = world.measure_episode(action[part], following[part], task_reward[part], solved)
+            measured |= {"diverged": float(diverged)} if diverged else {}
             key = {"task": task, "target": target, "step": first_step + end}
             rows += [key | {"metric": metric, "value": value} for metric, value in measured.items()]
     return rows
@@ -75,6 +75,11 @@ def log_pi_measures(batch: Batch) -> dict[str, Tensor]:
         for side, log_pi in sides.items()
         for q in QUANTILES
     }
+
+
+def broken_row(rows: Sequence[Row]) -> Row | None:
+    """The first row whose value is not finite. A correlation is none where one side does not vary."""
+    return next((row for row in rows if not (isfinite(row["value"]) or row["metric"].startswith("pearson"))), None)
 
 
 def rows_per_task(

@@ -8,7 +8,7 @@ import torch
 from torch import Tensor
 
 from mtcsirl.agents.optimiser import FlatAdam
-from mtcsirl.irl.losses import Loss, Pass, Points
+from mtcsirl.irl.losses import Adversarial, Pass, Points
 from mtcsirl.rewards.networks import RewardNetwork, network_inputs
 from mtcsirl.transitions import Transitions
 
@@ -37,7 +37,9 @@ class Batch(NamedTuple):
 class Discriminator:
     """A learned reward f with its loss and Adam."""
 
-    def __init__(self, network: RewardNetwork, loss: Loss, learning_rate: float, random: torch.Generator) -> None:
+    def __init__(
+        self, network: RewardNetwork, loss: Adversarial, learning_rate: float, random: torch.Generator
+    ) -> None:
         """``random`` draws the noise of the loss: interpolation and bottleneck."""
         self.network, self.loss, self._random = network, loss, random
         self._gradient = torch.zeros_like(network.parameters, requires_grad=False)
@@ -91,7 +93,7 @@ class Discriminator:
                 tensor.copy_(state[name])
 
 
-PolicyReward = Callable[[Tensor, Mapping[str, Tensor], Tensor], Tensor]
+GeneratorReward = Callable[[Tensor, Mapping[str, Tensor], Tensor], Tensor]
 """(r_task [T, B], learned rewards by name [T, B], alpha [T, 1]) -> the generators' reward [T, B]."""
 
 
@@ -105,7 +107,7 @@ class Method:
 
     name: str
     discriminators: Mapping[str, Discriminator]
-    policy_reward: PolicyReward
+    policy_reward: GeneratorReward
     knows_task_reward: bool
     """Whether generators may train on the task reward: then they may be warmed up on it."""
     uses_curriculum: bool

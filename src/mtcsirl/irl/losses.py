@@ -1,4 +1,4 @@
-"""Logits and losses of the discriminators: pure functions, and combinators that build a method's loss from them.
+"""Logits, penalties and the loss of the discriminators: functions, from which a method's loss is put together.
 
 Equation numbers are those of the paper. A discriminator D = exp(g) / (exp(g) + pi) has the logit
 log D - log(1 - D) = g - log pi, so that log D = -softplus(-logit) and log(1 - D) = -softplus(logit).
@@ -7,6 +7,7 @@ log D - log(1 - D) = g - log pi, so that log D = -softplus(-logit) and log(1 - D
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 import torch
@@ -46,14 +47,6 @@ def clamp_log_pi(log_pi: Tensor, limit: float) -> Tensor:
     return log_pi.clamp(-limit, limit)
 
 
-def bottleneck_information(mean: Tensor, log_std: Tensor) -> Tensor:
-    """KL(N(mean, std^2) || N(0, 1)) in nats, summed over z; [..., Z] -> [...].
-
-    Sum over z of (mean^2 + std^2 - 1) / 2 - log std. Source: Peng et al. (2018), equation 4, and their code.
-    """
-    return 0.5 * (mean.square() + torch.exp(2.0 * log_std) - 1.0 - 2.0 * log_std).sum(-1)
-
-
 def dual_step(beta: Tensor, information: Tensor, constraint: float, step: float) -> Tensor:
     """beta <- max(0, beta + step (KL - I_c)); Peng et al. (2018), equation 9. All scalars; KL and I_c in nats."""
     return (beta + step * (information - constraint)).clamp(min=0.0)
@@ -90,74 +83,8 @@ class Pass(NamedTuple):
     random: torch.Generator
 
 
-class Loss:
-    """A loss [T] of a pass [T, B]; parts with a state of their own update it after each step."""
-
-    def __call__(self, forward: Pass) -> Tensor:
-        """The loss of each task [T]."""
-        raise NotImplementedError
-
-    def logits(self, forward: Pass) -> tuple[Tensor, Tensor]:
-        """The discriminator's logits of expert and generator [T, B]."""
-        raise NotImplementedError
-
-    def after_update(self, forward: Pass) -> None:
-        """Called once after each step on the network's parameters."""
-
-    def metrics(self) -> dict[str, float]:
-        """What the loss has to report of its own state."""
-        return {}
-
-    def state(self) -> dict[str, Tensor]:
-        """Tensors that a checkpoint needs (not copies)."""
-        return {}
-
-
-class Adversarial(Loss):
-    """Equations 4 and 7 with one of the logits above."""
-
-    def __init__(self, logit: Logit) -> None:
-        self._logit = logit
-
-    def logits(self, forward: Pass) -> tuple[Tensor, Tensor]:
-        """The discriminator's logits of expert and generator [T, B]."""
-        network, tau = forward.network, forward.temperature
-        return tuple(  # type: ignore[return-value]
-            self._logit(network.shaped(output), side.task_reward, side.log_pi, tau)
-            for side, output in (
-                (forward.expert, forward.expert_output),
-                (forward.generator, forward.generator_output),
-            )
-        )
-
-    def __call__(self, forward: Pass) -> Tensor:
-        """The cross entropy of each task [T]."""
-        return cross_entropy(*self.logits(forward))
-
-
-class _Wrapped(Loss):
-    """A loss on top of another: everything not overridden is the inner loss's."""
-
-    def __init__(self, inner: Loss) -> None:
-        self.inner = inner
-
-    def logits(self, forward: Pass) -> tuple[Tensor, Tensor]:
-        """The inner loss's logits."""
-        return self.inner.logits(forward)
-
-    def after_update(self, forward: Pass) -> None:
-        """Hand on to the inner loss."""
-        self.inner.after_update(forward)
-
-    def metrics(self) -> dict[str, float]:
-        """The inner loss's report."""
-        return self.inner.metrics()
-
-    def state(self) -> dict[str, Tensor]:
-        """The inner loss's tensors."""
-        return self.inner.state()
-
-
+Penalty = Callable[[Pass], Tensor]
+"""What is added to the loss of each task: a pass [T, B] -> [T]."""
 PenaltyPoints = Callable[[Pass], Tensor]
 """Where a gradient penalty is taken: a pass -> inputs [T, B, I]."""
 
@@ -174,28 +101,24 @@ def interpolated_points(forward: Pass) -> Tensor:
     return generator + share * (expert - generator)
 
 
-class GradientPenalty(_Wrapped):
-    """inner + weight E ||grad_x f(x) / output_scale||^2: on the unscaled network, so that its size has one meaning."""
+def gradient_penalty_at(points: PenaltyPoints, weight: float) -> Penalty:
+    """weight E ||grad_x f(x) / output_scale||^2: on the unscaled network, so that its size has one meaning."""
 
-    def __init__(self, inner: Loss, weight: float, points: PenaltyPoints) -> None:
-        super().__init__(inner)
-        self._weight, self._points = weight, points
-
-    def __call__(self, forward: Pass) -> Tensor:
-        """The penalised loss of each task [T]."""
-        inputs = self._points(forward).detach().requires_grad_()
+    def penalty(forward: Pass) -> Tensor:
+        inputs = points(forward).detach().requires_grad_()
         value = forward.network.output(inputs, forward.random).value
-        return self.inner(forward) + self._weight * gradient_penalty(value, inputs)
+        return weight * gradient_penalty(value, inputs)
+
+    return penalty
 
 
-class InformationBottleneck(_Wrapped):
-    """inner + beta (E[KL(E(z|x) || N(0, 1))] - I_c) with dual ascent on beta; Peng et al. (2018), equations 5 to 9.
+class InformationBottleneck:
+    """beta (E[KL(E(z|x) || N(0, 1))] - I_c) with dual ascent on beta; Peng et al. (2018), equations 5 to 9.
 
     The expectation runs over expert and generator samples in equal parts. ``step`` = 0 keeps beta fixed.
     """
 
-    def __init__(self, inner: Loss, constraint: float, beta: float, step: float) -> None:
-        super().__init__(inner)
+    def __init__(self, constraint: float, beta: float, step: float) -> None:
         self._constraint, self._step = constraint, step
         self.beta = torch.tensor(beta)
         self.information = torch.zeros(())
@@ -206,19 +129,48 @@ class InformationBottleneck(_Wrapped):
         return 0.5 * (both[0].mean(-1) + both[1].mean(-1))
 
     def __call__(self, forward: Pass) -> Tensor:
-        """The constrained loss of each task [T]."""
-        return self.inner(forward) + self.beta * (self._information(forward) - self._constraint)
+        """The penalty of each task [T]."""
+        return self.beta * (self._information(forward) - self._constraint)
 
     def after_update(self, forward: Pass) -> None:
         """One dual step on beta, with the KL averaged over tasks."""
-        super().after_update(forward)
         self.information.copy_(self._information(forward).detach().mean())
         self.beta.copy_(dual_step(self.beta, self.information, self._constraint, self._step))
 
-    def metrics(self) -> dict[str, float]:
-        """Multiplier and KL (nats)."""
-        return {**self.inner.metrics(), "beta": float(self.beta), "kl": float(self.information)}
+    def state(self) -> dict[str, Tensor]:
+        """Multiplier and last KL (not copies)."""
+        return {"beta": self.beta, "kl": self.information}
+
+
+@dataclass(frozen=True)
+class Adversarial:
+    """The loss of a discriminator: equation 4 or 7 with one of the logits above, and what is added to it."""
+
+    logit: Logit
+    bottleneck: InformationBottleneck | None = None
+    penalties: tuple[Penalty, ...] = ()
+
+    def logits(self, forward: Pass) -> tuple[Tensor, Tensor]:
+        """The discriminator's logits of expert and generator [T, B]."""
+
+        def of(side: Points, output: Output) -> Tensor:
+            return self.logit(forward.network.shaped(output), side.task_reward, side.log_pi, forward.temperature)
+
+        return of(forward.expert, forward.expert_output), of(forward.generator, forward.generator_output)
+
+    def __call__(self, forward: Pass) -> Tensor:
+        """The loss of each task [T]."""
+        added = [penalty(forward) for penalty in self.penalties]
+        loss = cross_entropy(*self.logits(forward))
+        if self.bottleneck is not None:
+            loss = loss + self.bottleneck(forward)
+        return sum(added, loss)
+
+    def after_update(self, forward: Pass) -> None:
+        """Called once after each step on the network's parameters."""
+        if self.bottleneck is not None:
+            self.bottleneck.after_update(forward)
 
     def state(self) -> dict[str, Tensor]:
-        """Multiplier and last KL."""
-        return {**self.inner.state(), "beta": self.beta, "information": self.information}
+        """Its own tensors, which a checkpoint needs and diagnostics report (not copies)."""
+        return {} if self.bottleneck is None else self.bottleneck.state()

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import torch
@@ -30,13 +31,21 @@ OnStep = Callable[[np.ndarray, np.ndarray, Outcome], None]
 """(observation [T, O], action [T, A], outcome) of one environment step."""
 
 
-def collect(environments: Environments, act: Act, steps: int, episode_steps: int, on_step: OnStep) -> np.ndarray:
-    """``steps`` steps in every environment, from a reset and with one every ``episode_steps``; success [T, steps].
+class Flags(NamedTuple):
+    """What happened in each step of T environments, [T, steps] each."""
+
+    success: np.ndarray
+    diverged: np.ndarray
+    """The simulation diverged in this step, and its environment started over."""
+
+
+def collect(environments: Environments, act: Act, steps: int, episode_steps: int, on_step: OnStep) -> Flags:
+    """``steps`` steps in every environment, from a reset and with one every ``episode_steps``.
 
     Starting each iteration from a reset ("sample trajectories" in Algorithms 1 and 2) leaves nothing of the simulator
     to save between iterations.
     """
-    success = []
+    flags = []
     observation = np.empty(0)
     for step in range(steps):
         if step % episode_steps == 0:
@@ -44,9 +53,9 @@ def collect(environments: Environments, act: Act, steps: int, episode_steps: int
         action = act(observation)
         outcome = environments.step(action)
         on_step(observation, action, outcome)
-        success.append(outcome.success)
+        flags.append((outcome.success, outcome.diverged))
         observation = outcome.next_observation
-    return np.stack(success, axis=1)
+    return Flags(*(np.stack(column, axis=1) for column in zip(*flags, strict=True)))
 
 
 def gather(transitions: Transitions, index: Tensor) -> Transitions:

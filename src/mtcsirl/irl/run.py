@@ -11,8 +11,6 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-import torch
-from torch import Tensor
 
 from mtcsirl.episodes.demonstrations import load_demonstrations
 from mtcsirl.episodes.evaluation import COLUMNS, evaluate, measure_episode
@@ -20,14 +18,18 @@ from mtcsirl.episodes.gates import gate_verdict, stochastic_means
 from mtcsirl.episodes.lockstep import make_environments
 from mtcsirl.episodes.policy import Policy, save_policy
 from mtcsirl.errors import UserError
-from mtcsirl.files.storage import checksum, read_tensors, remove, write_csv, write_json, write_parquet, write_tensors
+from mtcsirl.files import stop
+from mtcsirl.files.checkpoint import load_checkpoint, save_checkpoint
+from mtcsirl.files.provenance import Stopwatch
+from mtcsirl.files.storage import checksum, write_csv, write_json, write_parquet
 from mtcsirl.irl.methods import METHODS
 from mtcsirl.irl.methods.base import Setup
+from mtcsirl.irl.resume import load_state, state
 from mtcsirl.irl.rollout import World
 from mtcsirl.irl.trainer import IrlTrainer
+from mtcsirl.rewards.adapter import ground_truth
 from mtcsirl.rewards.ground_truth import COMMON_SENSE_REWARDS
 from mtcsirl.rewards.learned import LearnedReward, save_learned_reward
-from mtcsirl.rewards.mixture import ground_truth
 from mtcsirl.settings.runs import IrlRunSettings
 from mtcsirl.study.outputs import CURVE_COLUMNS, DIAGNOSTIC_COLUMNS
 from mtcsirl.transitions import Transitions
@@ -49,24 +51,27 @@ def learn_reward(
     settings: IrlRunSettings,
     *,
     about: Mapping[str, Any] | None = None,
+    run: str = "",
+    stopwatch: Stopwatch | None = None,
 ) -> None:
     """Learn a reward from T files of demonstrations, one per (task, target), and write the run into ``folder``.
 
     ``cs_reward`` names what the experts were trained with; it is measured, never trained on. A checkpoint in
-    ``folder`` of the same run is taken up, and the run ends with the bytes of one that was never stopped.
+    ``folder`` of the same run is taken up, and the run ends with the bytes of one that was never stopped; the caller
+    removes it when all results stand. ``run``: what the result depends on beside the arguments (the code): a checkpoint
+    of another run is not taken up. ``stopwatch`` learns what earlier tries spent.
 
     Raises:
-        UserError: unknown method or cs-reward; unreadable demonstrations.
+        UserError: unknown method or cs-reward; unreadable demonstrations; a number that is not finite any more.
     """
     folder = Path(folder)
     trainer = make_trainer(method, cs_reward, demonstrations, seed, settings)
     try:
-        run = _fingerprint(method, cs_reward, [checksum(file) for file in demonstrations], seed, settings)
-        _train(trainer, folder / CHECKPOINT, run)
+        run = _fingerprint(run, method, cs_reward, [checksum(file) for file in demonstrations], seed, settings)
+        _train(trainer, folder / CHECKPOINT, run, stopwatch or Stopwatch())
         _write(trainer, folder, cs_reward, seed, dict(about or {}))
     finally:
         trainer.world.environments.close()
-    remove(folder / CHECKPOINT)
 
 
 def make_trainer(
@@ -90,17 +95,20 @@ def make_trainer(
     return IrlTrainer(METHODS[method](setup), world, experts.transitions, settings, seed)
 
 
-def _train(trainer: IrlTrainer, checkpoint: Path, fingerprint: str) -> None:
-    """Iterate to the end, from the checkpoint if it is of this very run."""
+@stop.deferred()
+def _train(trainer: IrlTrainer, checkpoint: Path, run: str, stopwatch: Stopwatch) -> None:
+    """Iterate to the end, from the checkpoint if it is of this very run; stopped, it ends with its iteration."""
     settings = trainer.settings
-    if checkpoint.is_file():
-        _resume(trainer, checkpoint, fingerprint)
+    _resume(trainer, checkpoint, run, stopwatch)
     every = max(1, settings.progress.checkpoint_every // settings.irl.steps_per_iteration)
     while trainer.iteration < trainer.iterations:
         trainer.iterate()
         _LOG.info("%s", _progress(trainer))
-        if trainer.iteration % every == 0 and trainer.iteration < trainer.iterations:
-            write_tensors(checkpoint, trainer.state() | _rows_to_tensors(trainer, fingerprint))
+        due = trainer.iteration % every == 0 and trainer.iteration < trainer.iterations
+        if due or stop.requested():
+            rows = {"curve": trainer.curve, "diagnostics": trainer.diagnostics}
+            save_checkpoint(checkpoint, state(trainer), rows | {"spent": stopwatch.read()}, run=run)
+            stop.stop_here(f"iteration {trainer.iteration}")
 
 
 def _progress(trainer: IrlTrainer) -> str:
@@ -116,24 +124,15 @@ def _fingerprint(*parts: Any) -> str:
     return hashlib.sha256(json.dumps(plain, sort_keys=True).encode()).hexdigest()
 
 
-def _rows_to_tensors(trainer: IrlTrainer, fingerprint: str) -> dict[str, Tensor]:
-    """The rows so far as bytes: a checkpoint is one file, so it is all there or not at all."""
-    text = json.dumps({"run": fingerprint, "curve": trainer.curve, "diagnostics": trainer.diagnostics})
-    return {"json": torch.from_numpy(np.frombuffer(text.encode(), dtype=np.uint8).copy())}
-
-
-def _resume(trainer: IrlTrainer, checkpoint: Path, fingerprint: str) -> None:
-    try:
-        tensors = read_tensors(checkpoint)
-        rows = json.loads(tensors.pop("json").numpy().tobytes())
-    except (UserError, KeyError, ValueError):
-        _LOG.warning("%s: unreadable; starting over", checkpoint)
+def _resume(trainer: IrlTrainer, checkpoint: Path, run: str, stopwatch: Stopwatch) -> None:
+    saved = load_checkpoint(checkpoint, run=run)
+    if saved is None:
         return
-    if rows["run"] != fingerprint:
-        _LOG.warning("%s: of a run with other settings; starting over", checkpoint)
-        return
-    trainer.load_state(tensors)
-    trainer.curve, trainer.diagnostics = rows["curve"], rows["diagnostics"]
+    tensors, notes = saved
+    load_state(trainer, tensors)
+    trainer.curve, trainer.diagnostics = notes["curve"], notes["diagnostics"]
+    stopwatch.add(notes["spent"])
+    _LOG.info("resumed at iteration %d", trainer.iteration)
 
 
 def _learned(trainer: IrlTrainer, cs_reward: str, about: dict[str, Any]) -> LearnedReward:

@@ -1,20 +1,22 @@
 """Algorithms 1 and 2: generators and discriminators in turn, T tasks in one process."""
 
+import math
 from collections.abc import Mapping, Sequence
-from functools import partial
 
 import numpy as np
 import torch
 from torch import Tensor
 
+from mtcsirl.agents.finite import NotFiniteError, broken_agents, broken_rows, discriminator_settings, sac_settings
 from mtcsirl.agents.learners import make_learner
 from mtcsirl.agents.replay import Replay
 from mtcsirl.agents.scripted import ScriptedExplorers
+from mtcsirl.agents.streams import Purpose, Streams, uniform
 from mtcsirl.episodes.lockstep import Outcome
-from mtcsirl.files.checkpoint import prefixed, without_prefix
 from mtcsirl.irl.densities import Densities
 from mtcsirl.irl.diagnostics import (
     Row,
+    broken_row,
     discriminator_measures,
     episode_rows,
     log_pi_measures,
@@ -22,8 +24,8 @@ from mtcsirl.irl.diagnostics import (
 )
 from mtcsirl.irl.discriminator import Batch, Discriminator, Method
 from mtcsirl.irl.losses import clamp_log_pi
-from mtcsirl.irl.rollout import World, collect, gather
-from mtcsirl.rewards.curriculum import R_MAX, Curriculum
+from mtcsirl.irl.rollout import Flags, World, collect, gather
+from mtcsirl.rewards.curriculum import R_MAX, Alpha
 from mtcsirl.rewards.networks import RewardNetwork
 from mtcsirl.settings import SacSettings
 from mtcsirl.settings.runs import IrlRunSettings
@@ -53,22 +55,25 @@ class IrlTrainer:
     ) -> None:
         """``demonstrations`` [T, N] are seen as the agent sees them."""
         self.method, self.world, self.settings = method, world, settings
-        self.irl = settings.irl
+        self.irl, self.seed = settings.irl, seed
         self.iteration = 0
         self._demonstrations = demonstrations
         tasks, steps = len(world.members), self.irl.steps_per_iteration
-        *seeds, own, replayed = (int(n) for n in np.random.SeedSequence(seed).generate_state(tasks + 2))
+        *seeds, own = (int(n) for n in np.random.SeedSequence(seed).generate_state(tasks + 1))
         state, action = demonstrations.observation.shape[-1], demonstrations.action.shape[-1]
         self.sac = make_learner(tasks, self._first_sac(), seeds, observation_size=state, action_size=action)
         capacity = min(self.irl.generator_memory, self.iterations * steps)
-        self.replay = Replay(tasks, capacity, seed=replayed, observation_size=state, action_size=action)
+        self.replay = Replay(seeds, capacity, observation_size=state, action_size=action)
+        self._random_actions = Streams(seeds, Purpose.RANDOM_ACTIONS, (action,), uniform)
         maximum = R_MAX if self.irl.curriculum_maximum == "task" else demonstrations.task_reward.mean(dim=1)
-        self.curriculum = Curriculum(tasks, self.irl.curriculum_window, maximum)
+        weighted = [self.irl.curriculum and method.uses_curriculum] * tasks
+        self.alpha = Alpha([self.irl.cs_weight] * tasks, weighted, self.irl.curriculum_window, maximum)
+        """The weight of f in each generator's reward [T]."""
         mixed = self.irl.generator_replay if self.irl.logit_density == "mixture" else 1
-        self._densities = Densities(demonstrations, settings.sac, policies=mixed, steps=steps)
+        self.densities = Densities(demonstrations, settings.sac, policies=mixed, steps=steps)
         self._policies_mixed = mixed
         self._scripted = self._explorers(seeds)
-        self._random = torch.Generator().manual_seed(own)
+        self.random = torch.Generator().manual_seed(own)
         self._paying: dict[str, RewardNetwork] = {}
         self._centres: dict[str, Tensor] = {}
         self.curve: list[Row] = []
@@ -84,10 +89,14 @@ class IrlTrainer:
         return self.method.knows_task_reward and self.iteration < self.irl.warm_up_iterations
 
     def iterate(self) -> None:
-        """One outer iteration of Algorithm 1 or 2."""
+        """One outer iteration of Algorithm 1 or 2.
+
+        Raises:
+            NotFiniteError: a number of a generator or a discriminator is not finite any more.
+        """
         steps, episode = self.irl.steps_per_iteration, self.settings.evaluation.episode_steps
-        random = self._acts_randomly
-        success = collect(self.world.environments, self._act, steps, episode, self._on_step)
+        random, rows = self._acts_randomly, (len(self.curve), len(self.diagnostics))
+        flags = collect(self.world.environments, self._act, steps, episode, self._on_step)
         wanted = not self._warming_up or self.iteration + self._policies_mixed > self.irl.warm_up_iterations
         if wanted and self.iteration >= self._scripted_rollouts:
             self._tabulate(random)
@@ -97,7 +106,11 @@ class IrlTrainer:
             sample = self.replay.sample(self.settings.sac.minibatch)
             reward = self.settings.sac.reward_scale * self.policy_reward(sample)
             self.sac.update(sample.observation, sample.action, reward, sample.next_observation)
-        self._note_generators(self.replay.latest(steps), success)
+        for generator, what in self.sac.broken_agents().items():
+            self._stop_at(what, [generator])
+        self._note_generators(self.replay.latest(steps), flags)
+        if row := broken_row([*self.curve[rows[0] :], *self.diagnostics[rows[1] :]]):
+            self._stop_at(row["metric"], [self.world.members.index((row["task"], row["target"]))])
         self.iteration += 1
         if self.iteration == self.irl.warm_up_iterations:
             self._fix_temperature()
@@ -108,6 +121,12 @@ class IrlTrainer:
         if self._warming_up and self.irl.warm_up_temperature == "automatic":
             return sac.model_copy(update={"temperature": "automatic"})
         return sac
+
+    def start_at(self, iteration: int) -> None:
+        """Go on from this iteration, once its state is restored."""
+        self.iteration = iteration
+        if not self._warming_up:
+            self._fix_temperature()
 
     def _fix_temperature(self) -> None:
         """From the first iteration of IRL on, a fixed temperature is fixed."""
@@ -141,22 +160,18 @@ class IrlTrainer:
 
     def _act(self, observation: np.ndarray) -> np.ndarray:
         if self._acts_randomly:
-            shape = (len(observation), self._demonstrations.action.shape[-1])
-            action = (2.0 * torch.rand(shape, generator=self._random) - 1.0).numpy()
+            action = 2.0 * self._random_actions.draw(self.replay.size).numpy() - 1.0
         else:
             action = self.sac.act(torch.from_numpy(observation).float()).numpy()
         self._scripted.replace(action, observation, self.replay.size)
+        self._stop_at("the action", broken_rows(action))
         return action
 
     def _on_step(self, observation: np.ndarray, action: np.ndarray, outcome: Outcome) -> None:
-        self.replay.add(observation, action, outcome.next_observation, outcome.task_reward)
-        self.curriculum.add(torch.from_numpy(outcome.task_reward))
-
-    def alpha(self) -> Tensor:
-        """The weight of f in each generator's reward [T]."""
-        use = self.irl.curriculum and self.method.uses_curriculum
-        weight = self.curriculum.weight() if use else torch.ones(len(self.world.members))
-        return self.irl.cs_weight * weight
+        self._stop_at("the task reward", broken_rows(outcome.task_reward))
+        self._stop_at("the observation", broken_rows(outcome.next_observation))
+        self.replay.add(observation, action, outcome.next_observation, outcome.task_reward, outcome.diverged)
+        self.alpha.add(torch.from_numpy(outcome.task_reward))
 
     def policy_reward(self, transitions: Transitions) -> Tensor:
         """What the generators are paid for transitions [T, B], under the rewards of this moment."""
@@ -187,6 +202,9 @@ class IrlTrainer:
         for name, discriminator in self.method.discriminators.items():
             update = self._update_as_printed if as_printed else self._update_batched
             self._paying[name], norms[name] = update(discriminator, batches)
+            parameters = discriminator.network.parameters.detach()
+            if not math.isfinite(norms[name]) or broken_agents({name: parameters}):
+                self._stop_at(f"discriminator {name}", range(len(self.world.members)))
             self._centres[name] = self.centre(self._paying[name])
         return norms
 
@@ -216,7 +234,7 @@ class IrlTrainer:
         """Note the policies that made the newest rollout; ``random``: it began with uniform actions."""
         uniform = random and self.irl.logit_density == "mixture"
         actors = None if uniform else [self.sac.policy(agent) for agent in range(len(self.world.members))]
-        self._densities.add(actors, self._window())
+        self.densities.add(actors, self._window())
 
     def _batches(self, count: int, minibatch: int) -> list[Batch]:
         """``count`` minibatches of expert and generator transitions [T, minibatch] with their log pi."""
@@ -225,12 +243,12 @@ class IrlTrainer:
             temperature = torch.ones_like(temperature)
         sides = []
         for held, log_pi in (
-            (self._demonstrations, self._densities.expert()),
-            (self._window(), self._densities.generator()),
+            (self._demonstrations, self.densities.expert()),
+            (self._window(), self.densities.generator()),
         ):
             log_pi = clamp_log_pi(log_pi, self.irl.discriminator.log_pi_clamp)
             shape = count, len(log_pi), minibatch
-            index = torch.randint(log_pi.shape[1], shape, generator=self._random)
+            index = torch.randint(log_pi.shape[1], shape, generator=self.random)
             sides.append([(self._scaled(gather(held, one)), log_pi.gather(1, one)) for one in index])
         return [
             Batch(expert, generator, expert_log_pi, generator_log_pi, temperature)
@@ -240,7 +258,19 @@ class IrlTrainer:
     def _scaled(self, transitions: Transitions) -> Transitions:
         return transitions._replace(task_reward=self.irl.task_reward_scale * transitions.task_reward)
 
-    # --- reporting and resuming ---------------------------------------------------------------------------------
+    def _stop_at(self, what: str, generators: Sequence[int]) -> None:
+        """End the run if any generator is concerned: nothing may be made of a number that is not finite."""
+        if generators:
+            task, target = self.world.members[generators[0]]
+            who = what if what.startswith("discriminator") else f"{what} of {task}-t{target}"
+            settings = f"{discriminator_settings(self.irl.discriminator)}, {sac_settings(self.settings.sac)}"
+            raise NotFiniteError(
+                f"{self.method.name} s{self.seed}: {who} became non-finite in iteration {self.iteration + 1}, step "
+                f"{self.replay.size}, with {settings}: lower a learning rate or a scale",
+                generators,
+            )
+
+    # --- reporting ------------------------------------------------------------------------------------------------
 
     @property
     def _steps_after(self) -> int:
@@ -254,46 +284,17 @@ class IrlTrainer:
             self.diagnostics += rows_per_task(members, self._steps_after, metric, values, discriminator="")
         for name, discriminator in self.method.discriminators.items():
             measures = discriminator_measures(discriminator, batch, self.world.truth)
-            shared = {"gradient_norm": norms[name], **discriminator.loss.metrics()}
-            measures |= {metric: torch.full((len(members),), value) for metric, value in shared.items()}
+            shared = {"gradient_norm": torch.tensor(norms[name]), **discriminator.loss.state()}
+            measures |= {metric: value.expand(len(members)) for metric, value in shared.items()}
             for metric, values in measures.items():
                 self.diagnostics += rows_per_task(members, self._steps_after, metric, values, discriminator=name)
 
-    def _note_generators(self, rollout: Transitions, success: np.ndarray) -> None:
+    def _note_generators(self, rollout: Transitions, flags: Flags) -> None:
         """Rows on the episodes and on the generators' learning."""
         members, start = self.world.members, self.iteration * self.irl.steps_per_iteration
-        self.curve += episode_rows(self.world, rollout, success, start, self.settings.evaluation.episode_steps)
+        self.curve += episode_rows(self.world, rollout, flags, start, self.settings.evaluation.episode_steps)
         learning = self.sac.metrics() | {"temperature": self.temperature, "curriculum": self.alpha()}
         for metric in ("temperature", "curriculum"):
             self.curve += rows_per_task(members, self._steps_after, metric, learning[metric])
         for metric, values in learning.items():
             self.diagnostics += rows_per_task(members, self._steps_after, metric, values, discriminator="")
-
-    def state(self) -> dict[str, Tensor]:
-        """Everything that an exact resume between two iterations needs, as named tensors."""
-        parts: dict[str, dict[str, Tensor]] = {
-            "sac": self.sac.state_dict(),
-            "replay": self.replay.state_dict(),
-            "curriculum": self.curriculum.state(),
-            "densities": self._densities.state(),
-            "trainer": {"random": self._random.get_state(), "iteration": torch.tensor(self.iteration)},
-        }
-        parts |= {f"discriminator_{name}": one.state() for name, one in self.method.discriminators.items()}
-        return {name: tensor for part, state in parts.items() for name, tensor in prefixed(part, state).items()}
-
-    def load_state(self, state: Mapping[str, Tensor]) -> None:
-        """Restore what ``state`` gave; the rows in ``curve`` and ``diagnostics`` are the caller's to restore."""
-        part = partial(without_prefix, tensors=dict(state))
-        trainer = part("trainer")
-        self.iteration = int(trainer["iteration"])
-        if not self._warming_up:
-            self._fix_temperature()
-        self.sac.load_state_dict(part("sac"))
-        self.replay.load_state_dict(part("replay"))
-        curriculum = part("curriculum")
-        for name, tensor in self.curriculum.state().items():
-            tensor.copy_(curriculum[name])
-        self._densities.load_state(part("densities"))
-        self._random.set_state(trainer["random"])
-        for name, discriminator in self.method.discriminators.items():
-            discriminator.load_state(part(f"discriminator_{name}"))

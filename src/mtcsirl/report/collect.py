@@ -20,12 +20,13 @@ from mtcsirl.report.content import (
     TargetLine,
     WhatWasRun,
 )
-from mtcsirl.report.markdown import parse_table
+from mtcsirl.report.measured import measured
 from mtcsirl.settings import Settings
 from mtcsirl.settings.template import deviations
 from mtcsirl.study.design import ARTEFACTS, design
 from mtcsirl.study.outputs import OUTPUTS
 from mtcsirl.study.runs import AnyRun, Study
+from mtcsirl.tables.table import Table
 
 SUMMARY_TARGETS = {"claims": "the verdicts on all claims", "report": "this page", "all": "everything"}
 
@@ -36,7 +37,7 @@ def collect(settings: Settings, page: Path, *, partial: bool = False) -> ReportD
     Raises UserError when something is missing and ``partial`` is false.
     """
     study = design(settings)
-    results = Path(settings.results)
+    results, claims = Path(settings.results), Path(settings.results) / "claims" / "claims"
     provenance = {run: found for run in study if (found := _json(run, settings, "provenance.json"))}
     missing = [(name, _title(name)) for name in ARTEFACTS if not _picture_or_table(name, settings).is_file()]
     if missing and not partial:
@@ -45,15 +46,17 @@ def collect(settings: Settings, page: Path, *, partial: bool = False) -> ReportD
     there = [name for name in ARTEFACTS if name not in dict(missing)]
     return ReportData(
         run=_what_was_run(settings, study, provenance),
-        claims=_claims(results / "claims" / "claims.json", partial),
+        claims=_claims(claims.with_suffix(".json"), partial),
         tables=tuple(_table(name, settings, page) for name in there if name.startswith("table_")),
         figures=tuple(_figure(name, settings, page) for name in there if name.startswith("figure_")),
         gates=_gates(study, results),
         deviations=tuple(_deviation_lines(settings)),
         targets=tuple(_targets(settings, study, provenance)),
         missing=tuple(missing),
-        links=_links(page, (("verdicts as data", results / "claims" / "claims.json"),)),
-        claims_picture=_optional_picture("claims_picture", "All verdicts", results / "claims" / "claims.png"),
+        links=_links(
+            page, (("every number (JSON)", claims.with_suffix(".json")), ("Markdown", claims.with_suffix(".md")))
+        ),
+        claims_picture=_optional_picture("claims_picture", "All verdicts", claims.with_suffix(".png")),
     )
 
 
@@ -72,18 +75,21 @@ TABLE_TITLES = {
 }
 
 
+TABLE_FILES = (("its rows (CSV)", "csv"), ("Markdown", "md"), ("LaTeX", "tex"), ("JSON", "json"))
+
+
 def _picture_or_table(name: str, settings: Settings) -> Path:
     if name.startswith("figure_"):
         return Path(settings.figures) / f"{name}.png"
-    return Path(settings.results) / "tables" / f"{name}.md"
+    return Path(settings.results) / "tables" / f"{name}.json"
 
 
 def _table(name: str, settings: Settings, page: Path) -> TableView:
     path = _picture_or_table(name, settings)
-    table = parse_table(storage.read_text(path), path)
-    files = ((ending.upper(), path.with_suffix(f".{ending}")) for ending in ("csv", "md", "tex"))
-    picture = _optional_picture(f"{name}_picture", "as a heat map", path.with_suffix(".png"))
-    return TableView(name, table.caption, table.head, table.rows, table.notes, _links(page, tuple(files)), picture)
+    table = Table.from_json(storage.read_json(path), path)
+    files = tuple((text, path.with_suffix(f".{ending}")) for text, ending in TABLE_FILES)
+    picture = _optional_picture(f"{name}_picture", "As a heat map", path.with_suffix(".png"))
+    return TableView(name, _title(name), table, _links(page, files), picture)
 
 
 def _figure(name: str, settings: Settings, page: Path) -> FigureView:
@@ -158,7 +164,7 @@ def _claims(path: Path, partial: bool) -> tuple[Claim, ...]:
 def _claim(found: dict[str, Any]) -> Claim:
     units = tuple(unit["texts"] for unit in found["units"])
     texts = {name: found[name] for name in ("name", "text", "locus", "criterion", "verdict", "reason")}
-    return Claim(**texts, units=units)
+    return Claim(**texts, units=units, measured=measured(found["units"]))
 
 
 def _gates(study: Study, results: Path) -> tuple[GateLine, ...]:

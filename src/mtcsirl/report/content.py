@@ -3,6 +3,8 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from mtcsirl.tables.table import Table
+
 
 @dataclass(frozen=True)
 class StageCost:
@@ -29,7 +31,10 @@ class WhatWasRun:
 
 @dataclass(frozen=True)
 class Claim:
-    """One claim with its verdict; ``units`` are what was judged, each with the texts of ``unit_text.COLUMNS``."""
+    """One claim with its verdict; ``units`` are what was judged, each with the texts of ``unit_text.COLUMNS``.
+
+    ``measured``: what the criterion looks at, with its interval, in one line.
+    """
 
     name: str
     text: str
@@ -38,17 +43,16 @@ class Claim:
     verdict: str
     reason: str
     units: tuple[Mapping[str, str], ...] = ()
+    measured: str = ""
 
 
 @dataclass(frozen=True)
 class TableView:
-    """A table as printed: ``rows`` are (label, cells); ``links`` are (text, relative address)."""
+    """A table and where its files are: ``links`` are (text, relative address)."""
 
     name: str
-    caption: str
-    head: tuple[str, ...]
-    rows: tuple[tuple[str, ...], ...]
-    notes: tuple[str, ...]
+    title: str
+    table: Table
     links: tuple[tuple[str, str], ...] = ()
     picture: "FigureView | None" = None
     """The table as a heat map, where there is one."""

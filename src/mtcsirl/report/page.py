@@ -1,6 +1,7 @@
-"""The start page as one HTML file: styles and pictures inside, no script, nothing from a network."""
+"""The start page as one HTML file: styles, pictures and one short script inside, nothing from a network."""
 
 from base64 import b64encode
+from hashlib import sha256
 from importlib import resources
 
 from jinja2 import Environment, FunctionLoader, StrictUndefined
@@ -8,7 +9,7 @@ from markupsafe import Markup
 
 from mtcsirl.claims.unit_text import COLUMNS
 from mtcsirl.report.content import FigureView, ReportData
-from mtcsirl.tables.cells import LINES
+from mtcsirl.results.notes import Kind, of_kind, scale_notes
 
 VERDICTS = {
     "reproduced": "good",
@@ -20,6 +21,8 @@ VERDICTS = {
 }
 """Verdict and its style; the words stand beside the colour."""
 CONFIGS = {"smoke": "--configfile config/smoke.yaml ", "paper": "--configfile config/paper.yaml "}
+BESIDE: tuple[Kind, ...] = ("scale", "gap", "mark")
+"""Notes that are read with a table; remarks are unfolded, and deviations have a section of their own."""
 
 
 def build_report(data: ReportData) -> str:
@@ -29,18 +32,22 @@ def build_report(data: ReportData) -> str:
     )
     environment.filters |= {
         "picture": _picture,
-        "strong": _strong,
         "number": _number,
         "title": _title,
         "duration": _duration,
     }
+    script = _file("page.js")
     return environment.get_template("page.html").render(
         data=data,
         css=Markup(_file("page.css")),
+        script=Markup(script),
+        script_hash=b64encode(sha256(script.encode()).digest()).decode(),
         verdict_style=VERDICTS,
         verdict_counts=_verdict_counts(data),
-        secondary=LINES[1:],
         unit_columns=COLUMNS,
+        warnings=scale_notes(data.run.scale),
+        beside=lambda notes: of_kind(notes, *BESIDE),
+        of_kind=of_kind,
         command=f"snakemake --cores 2 {CONFIGS.get(data.run.scale, '')}",
     )
 
@@ -52,13 +59,6 @@ def _file(name: str) -> str:
 def _picture(figure: FigureView) -> str:
     """The PNG as a data address, so that the page can be moved and mailed."""
     return "data:image/png;base64," + b64encode(figure.png).decode("ascii")
-
-
-def _strong(text: str) -> Markup:
-    """``**x**`` as strong text, everything else escaped."""
-    if text.startswith("**") and text.endswith("**") and len(text) > 4:
-        return Markup("<strong>{}</strong>").format(text[2:-2])
-    return Markup("{}").format(text)
 
 
 def _number(value: float | None, digits: int = 2) -> str:

@@ -1,18 +1,21 @@
-"""``docs/results.md``: verdicts and tables of a study as one page of plain Markdown, for reading without the report."""
+"""``docs/results.md``: verdicts and tables of a study as one page of plain Markdown, for reading without the report.
 
-from collections.abc import Mapping, Sequence
+What has not been run is named in one line, not spelled out.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from mtcsirl.claims.claims import Finding, claims_markdown
+from mtcsirl.claims.claims import NEVER_RUN, Finding, claims_markdown
+from mtcsirl.results.notes import deviation_notes, of_kind, study_note
 from mtcsirl.settings import Settings
-from mtcsirl.settings.template import deviations
-from mtcsirl.tables.table import DIFFERS, Table, scale_notes
+from mtcsirl.tables.table import Table
 
 HEAD = """\
 # Results
 
 Written by `{command}`; edit nothing here. {scale}.
-Every number is ours with the paper's below it; how each claim was judged stands in
+The paper's numbers stand beside ours; how each claim was judged stands in
 [the criteria](../src/mtcsirl/claims/claims.yaml), fixed before the runs.
 """
 
@@ -26,18 +29,43 @@ def results_page(
     command: str = "mtcsirl results",
 ) -> str:
     """The page: what was run, verdicts, tables, deviations once (and not under each table)."""
-    parts = [HEAD.format(command=command, scale="; ".join(scale_notes(settings))).rstrip()]
+    parts = [HEAD.format(command=command, scale=study_note(settings).text).rstrip()]
     if provenance:
-        parts += ["", "| | |", "| :-- | :-- |", *(f"| {name} | {value} |" for name, value in provenance.items())]
-    parts += ["", "## Which claims hold", "", claims_markdown(findings, settings).rstrip()]
-    parts += ["", "## Tables"]
+        rows = ["| | |", "| :-- | :-- |", *(f"| {name} | {value} |" for name, value in provenance.items())]
+        parts.append("\n".join(rows))
+    parts += ["## Which claims hold", *_claims(findings, settings)]
+    parts += ["## Tables", *_tables(tables)]
+    parts += ["## Deviations from the paper", *_deviations(settings, any(not t.is_empty for t in _results_of(tables)))]
+    return "\n\n".join(parts) + "\n"
+
+
+def _claims(findings: Sequence[Finding], settings: Settings) -> Iterator[str]:
+    judged = [finding for finding in findings if finding.verdict != NEVER_RUN]
+    if judged:
+        yield claims_markdown(judged, settings).rstrip()
+    waiting = [finding.name for finding in findings if finding.verdict == NEVER_RUN]
+    if waiting:
+        yield f"Not run yet: {', '.join(waiting)}."
+
+
+def _tables(tables: Mapping[str, Table]) -> Iterator[str]:
     for table in tables.values():
-        parts += ["", f"### {table.title}", "", _without_deviations(table)]
-    parts += ["", "## Deviations from the paper", ""]
-    parts += [f"- {deviation}" for deviation in deviations(settings)] or ["None."]
-    return "\n".join(parts) + "\n"
+        if not table.is_empty:
+            yield from (f"### {table.title}", table.brief())
+    empty = [table.title for table in tables.values() if table.is_empty]
+    if empty:
+        yield f"No run yet, or no part of this study: {', '.join(empty)}."
 
 
-def _without_deviations(table: Table) -> str:
-    lines = table.markdown().splitlines()
-    return "\n".join(line for line in lines if not line.startswith(f"- {DIFFERS}")).rstrip()
+def _results_of(tables: Mapping[str, Table]) -> list[Table]:
+    """The tables that are made from runs; Table 5 is made from the settings alone."""
+    return [table for table in tables.values() if "n" in table.numbers]
+
+
+def _deviations(settings: Settings, some_results: bool) -> Iterator[str]:
+    notes = deviation_notes(settings)
+    found = of_kind(notes, "deviation")
+    if not some_results and found:
+        yield f"{len(found)} settings differ from the paper's; `mtcsirl deviations` prints them."
+    else:
+        yield "\n".join(f"- {note.text}" for note in notes)

@@ -20,6 +20,7 @@ import pandas as pd
 
 from mtcsirl.errors import UserError
 from mtcsirl.files import storage
+from mtcsirl.results.rows import run_key
 from mtcsirl.study.outputs import DIAGNOSTIC_COLUMNS
 from mtcsirl.study.runs import IrlRun
 
@@ -50,7 +51,7 @@ def read_diagnoses(runs: Sequence[IrlRun], results: Path | str) -> pd.DataFrame:
             raise UserError(
                 f"{folder}: gate.json or diagnostics.csv lacks {error} of a generator; make the run again"
             ) from error
-        frames.append(found.assign(**{name: getattr(run, name) for name in RUN}))
+        frames.append(found.assign(**run_key(run) | {"seed": run.seed}).drop(columns="stage"))
     return pd.concat(frames, ignore_index=True)[list(COLUMNS)] if frames else pd.DataFrame(columns=list(COLUMNS))
 
 

@@ -4,8 +4,7 @@
 status. No row is dropped: a run that the study asks for and that is not there stands in the frame with value NaN.
 """
 
-from collections.abc import Iterator, Sequence
-from itertools import product
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +14,11 @@ import pandas as pd
 from mtcsirl.errors import MissingError, UserError
 from mtcsirl.files import storage
 from mtcsirl.names import CS_REWARDS, DIVERGED, KEPT, LAST, distance_metric
-from mtcsirl.study.runs import Baseline, Demonstrations, Expert, IrlRun, Run, Study, Transfer
+from mtcsirl.results.completeness import POLICIES, what_lacks
+from mtcsirl.settings import Settings
+from mtcsirl.study import standing as standings
+from mtcsirl.study.runs import AnyRun, Baseline, Demonstrations, Expert, IrlRun, Runs, Transfer
+from mtcsirl.study.standing import DONE, standing
 
 KEY = ("stage", "experiment", "method", "cs_reward", "source", "task", "target", "seed")
 ROW_COLUMNS = (*KEY, "policy", "kept", "metric", "value", "episodes", "diverged", "status", "lacks", "folder")
@@ -25,69 +28,61 @@ SCORE_COLUMNS = (*RUN_KEY, "transitions", "reward", "statistic", "value", "low",
 POINT_COLUMNS = (*RUN_KEY, "transitions", "agent", "episode", "truth", "learned", "task_reward", "random")
 EVALUATION_COLUMNS = ("task", "target", "seed", "policy", "kept", "episode", "metric", "value")
 
-OK, BELOW_GATE, MISSING, DUPLICATED, FOREIGN, INCOMPLETE = (
-    "ok", "below gate", "missing", "duplicated", "foreign", "incomplete"
+OK, BELOW_GATE, MISSING, DUPLICATED, FOREIGN, INCOMPLETE, STALE = (
+    "ok", "below gate", "missing", "duplicated", "foreign", "incomplete", "stale"
 )  # fmt: skip
 """Status of a run. Below gate: the agent did not learn what it had to; its value counts and is marked. Missing: no
 evaluation. Duplicated: the numbers of another seed, or an episode twice. Foreign: the file names another task, target
 or seed than its folder. Incomplete: not the episodes, policies and metrics that the settings ask for, or values
-that are no numbers; ``lacks`` says which. The last four have the value NaN: nothing is averaged over the rest."""
+that are no numbers; ``lacks`` says which. Stale: made with other settings or code, or from other inputs. The last
+five have the value NaN: nothing is averaged over the rest."""
 
-POLICIES = ("stochastic", "deterministic")
 
-
-def evaluation_rows(
-    study: Study, results: Path | str, *, episodes: int, partial: bool = False, kept: str = KEPT
-) -> pd.DataFrame:
+def evaluation_rows(study: Runs, settings: Settings, *, partial: bool = False, kept: str = KEPT) -> pd.DataFrame:
     """Every agent of ``study`` with its evaluation, ``ROW_COLUMNS``; agents are run x member for IRL runs.
 
-    ``episodes``: how many of each policy the settings ask for. ``diverged``: in how many of them the simulation
-    diverged; they count as failed. ``kept``: the policy that each run leaves behind; see ``last_rows`` for the other.
+    ``settings``: the study's; a run that is not what they ask for is stale, whatever numbers it has. ``diverged``: in
+    how many episodes the simulation diverged; they count as failed. ``kept``: the policy that each run leaves behind;
+    see ``last_rows`` for the other.
     Demonstrations are rows too, of the stage ``collect_demonstrations`` with the seed of their expert: what their
     episodes reached and whether that passes the expert's gate.
 
     Raises:
-        UserError: a run is missing and ``partial`` is false; a file is unreadable.
+        UserError: a run is missing or stale and ``partial`` is false; a file is unreadable.
     """
     frames = []
+    names, asked = metrics(study), settings.evaluation.episodes
     for run in study:
         if kept == LAST and not isinstance(run, Expert | Baseline):
             continue
+        status, why = _standing(run, settings, partial)
+        folder = Path(settings.results) / run.folder
         for agent in agents(run):
-            folder = Path(results) / run.folder
-            if not (folder / "evaluation.csv").is_file():
-                _demand(folder / "evaluation.csv", partial)
-            frames.append(_agent_rows(agent, folder, metrics(study), episodes, kept))
-    if kept == KEPT:
-        frames += [_demonstration_rows(run, Path(results) / run.folder, partial) for run in study.demonstrations]
+            if status:
+                frames.append(_unusable(agent, folder, names, kept, status, why))
+            else:
+                frames.append(_agent_rows(agent, folder, names, asked, kept))
+        if kept == KEPT and isinstance(run, Demonstrations):
+            frames.append(_demonstration_rows(run, folder, status, why))
     rows = pd.concat(frames, ignore_index=True) if frames else pd.DataFrame({name: [] for name in ROW_COLUMNS})
     return _mark_equal_seeds(rows[list(ROW_COLUMNS)])
 
 
-def last_rows(study: Study, results: Path | str, *, episodes: int, partial: bool = False) -> pd.DataFrame:
+def last_rows(study: Runs, settings: Settings, *, partial: bool = False) -> pd.DataFrame:
     """``evaluation_rows`` of the last policies of experts and SAC, which keep their best; new agents keep their last.
 
     No gate is asked of them: their status is never "below gate".
     """
-    return evaluation_rows(study, results, episodes=episodes, partial=partial, kept=LAST)
+    return evaluation_rows(study, settings, partial=partial, kept=LAST)
 
 
-def ablated_generators(study: Study, results: Path | str, experiment: str, *, episodes: int) -> pd.DataFrame:
-    """The generators of a variant, with the name of its ablation as their experiment; runs that are not there: none.
-
-    A variant has the keys of the main study's runs: without a name of their own they would be taken for those.
-    """
-    rows = evaluation_rows(study, results, episodes=episodes, partial=True)
-    return select(rows, stage="learn_reward").assign(experiment=experiment)
-
-
-def curve_rows(study: Study, results: Path | str, *, partial: bool = False) -> pd.DataFrame:
-    """The learning curves of all agents of ``study``, ``CURVE_COLUMNS``; missing runs have no rows."""
+def curve_rows(study: Runs, settings: Settings, *, partial: bool = False) -> pd.DataFrame:
+    """The learning curves of all agents of ``study``, ``CURVE_COLUMNS``; missing and stale runs have no rows."""
     frames = []
     for run in study:
-        path = Path(results) / run.folder / "curve.csv"
+        path = Path(settings.results) / run.folder / "curve.csv"
         own_agents = list(agents(run))
-        if not own_agents or not _present(path, partial):
+        if not own_agents or _standing(run, settings, partial)[0]:
             continue
         curve = storage.read_csv(path, ("step", "metric", "value"))
         for agent in own_agents:
@@ -98,23 +93,23 @@ def curve_rows(study: Study, results: Path | str, *, partial: bool = False) -> p
     return _joined(frames, CURVE_COLUMNS)
 
 
-def score_rows(study: Study, results: Path | str, *, partial: bool = False) -> pd.DataFrame:
-    """Correlations of learned and true rewards, ``SCORE_COLUMNS`` + task; missing runs have no rows."""
-    return _of_scores(study, results, "scores.csv", (*SCORE_COLUMNS, "task"), partial)
+def score_rows(study: Runs, settings: Settings, *, partial: bool = False) -> pd.DataFrame:
+    """Correlations of learned and true rewards, ``SCORE_COLUMNS`` + task; missing and stale runs have no rows."""
+    return _of_scores(study, settings, "scores.csv", (*SCORE_COLUMNS, "task"), partial)
 
 
-def point_rows(study: Study, results: Path | str, *, partial: bool = False) -> pd.DataFrame:
-    """Single transitions of those correlations, ``POINT_COLUMNS`` + task; missing runs have no rows."""
-    return _of_scores(study, results, "points.parquet", (*POINT_COLUMNS, "task"), partial)
+def point_rows(study: Runs, settings: Settings, *, partial: bool = False) -> pd.DataFrame:
+    """Single transitions of those correlations, ``POINT_COLUMNS`` + task; missing and stale runs have no rows."""
+    return _of_scores(study, settings, "points.parquet", (*POINT_COLUMNS, "task"), partial)
 
 
-def _of_scores(study: Study, results: Path | str, name: str, columns: tuple[str, ...], partial: bool) -> pd.DataFrame:
+def _of_scores(study: Runs, settings: Settings, name: str, columns: tuple[str, ...], partial: bool) -> pd.DataFrame:
     read = storage.read_parquet if name.endswith("parquet") else storage.read_csv
     own = (*RUN_KEY, "task")
     frames = []
     for run in study.scores:
-        path = Path(results) / run.folder / name
-        if _present(path, partial):
+        path = Path(settings.results) / run.folder / name
+        if not _standing(run, settings, partial)[0]:
             key = {part: getattr(run.irl, part) for part in RUN_KEY} | {"task": run.task}
             frame = read(path, tuple(column for column in columns if column not in own))
             frames.append(frame.assign(**key))
@@ -146,7 +141,7 @@ def matrix(rows: pd.DataFrame) -> pd.DataFrame:
     return rows.pivot(index="seed", columns="task", values="value").astype(float)
 
 
-def agents(run: Run) -> Iterator[dict[str, Any]]:
+def agents(run: AnyRun) -> Iterator[dict[str, Any]]:
     """The ``KEY`` of each agent that ``run`` evaluates."""
     key = run_key(run)
     if isinstance(run, IrlRun):
@@ -156,19 +151,19 @@ def agents(run: Run) -> Iterator[dict[str, Any]]:
         yield key | {"task": run.task, "target": run.target, "seed": run.seed}
 
 
-def run_key(run: Run) -> dict[str, Any]:
-    """The part of ``KEY`` that all agents of ``run`` share."""
+def run_key(run: AnyRun) -> dict[str, Any]:
+    """The part of ``KEY`` that all agents of ``run`` share; a variant's experiment is its name, as ``ablation_x/y``."""
     irl = run.irl if isinstance(run, Transfer) else run if isinstance(run, IrlRun) else None
     return {
         "stage": run.stage,
-        "experiment": irl.experiment if irl else "",
+        "experiment": (run.key["variant"].removeprefix("ablations/").rstrip("/") or irl.experiment) if irl else "",
         "method": irl.method if irl else "",
         "cs_reward": irl.cs_reward if irl else getattr(run, "cs_reward", ""),
         "source": irl.source if irl else "",
     }
 
 
-def metrics(study: Study) -> tuple[str, ...]:
+def metrics(study: Runs) -> tuple[str, ...]:
     """What is read of an evaluation: success, mean and distance of cs-rewards, task reward.
 
     The cs-rewards are the paper's two and further ones of this study.
@@ -198,29 +193,19 @@ def _agent_rows(agent: dict[str, Any], folder: Path, names: tuple[str, ...], ask
     return rows.reset_index().assign(**agent, kept=kept, status=status, lacks=lacks, folder=str(folder))
 
 
-def what_lacks(rows: pd.DataFrame, names: Sequence[str], asked: int) -> str:
-    """What the episodes of one agent lack of ``asked`` whole ones of each policy, each with the metrics ``names``.
-
-    "" if nothing: every policy and metric has exactly the episodes 0 to ``asked`` - 1, and all values are finite.
-    """
-    needed = rows[rows["metric"].isin(names) & rows["policy"].isin(POLICIES)]
-    cells = set(zip(needed["policy"], needed["metric"], needed["episode"], strict=True))
-    wanted = set(product(POLICIES, names, range(asked)))
-    if cells != wanted:
-        policy, metric, _ = min(cells ^ wanted)
-        found = sum(cell[:2] == (policy, metric) for cell in cells)
-        return f"{policy} {metric}: {found} of {asked} episodes"
-    broken = needed[~np.isfinite(needed["value"].to_numpy(dtype=float))]
-    for policy, metric, episode in broken[["policy", "metric", "episode"]].itertuples(index=False):
-        return f"{policy} {metric}: episode {int(episode)} has no number"
-    return ""
+def _unusable(
+    agent: dict[str, Any], folder: Path, names: tuple[str, ...], kept: str, status: str, why: str
+) -> pd.DataFrame:
+    """The rows of an agent without usable numbers."""
+    grid = pd.MultiIndex.from_product([POLICIES, names], names=["policy", "metric"])
+    rows = pd.DataFrame({"value": np.nan, "episodes": 0, "diverged": 0}, index=grid)
+    return rows.reset_index().assign(**agent, kept=kept, status=status, lacks=why, folder=str(folder))
 
 
-def _demonstration_rows(run: Demonstrations, folder: Path, partial: bool) -> pd.DataFrame:
+def _demonstration_rows(run: Demonstrations, folder: Path, status: str, why: str) -> pd.DataFrame:
     """Success and metric of one expert's demonstrations."""
     verdict: dict[str, Any] = {"success": np.nan, "metric": np.nan}
-    status = MISSING
-    if _present(folder / "gate.json", partial):
+    if not status:
         verdict = _verdict(folder / "gate.json")
         status = OK if verdict["passed"] else BELOW_GATE
     key = run_key(run) | {"task": run.task, "target": run.target, "seed": run.expert.seed}
@@ -231,7 +216,7 @@ def _demonstration_rows(run: Demonstrations, folder: Path, partial: bool) -> pd.
             "value": np.array([verdict["success"], verdict["metric"]], dtype=float),  # None, which is no number: NaN
         }
     )
-    marks: dict[str, Any] = {"episodes": 0, "diverged": int(verdict.get("diverged", 0)), "status": status, "lacks": ""}
+    marks: dict[str, Any] = {"episodes": 0, "diverged": int(verdict.get("diverged", 0)), "status": status, "lacks": why}
     return rows.assign(**key, **marks, kept=KEPT, folder=str(folder))
 
 
@@ -287,13 +272,18 @@ def _mark_equal_seeds(rows: pd.DataFrame) -> pd.DataFrame:
     )
 
 
-def _present(path: Path, partial: bool) -> bool:
-    if path.is_file():
-        return True
-    _demand(path, partial)
-    return False
+def _standing(run: AnyRun, settings: Settings, partial: bool) -> tuple[str, str]:
+    """MISSING or STALE and why, or nothing where the run is what the settings ask for.
 
-
-def _demand(path: Path, partial: bool) -> None:
+    Raises:
+        UserError: it is not, and ``partial`` is false.
+    """
+    found = standing(run, settings)
+    if found.state == DONE:
+        return "", ""
+    stale = found.state == standings.STALE
     if not partial:
-        raise MissingError(f"{path}: this run is missing")
+        state = "stale" if stale else "missing"
+        why = f" ({found.why[0]})" if found.why else ""
+        raise MissingError(f"{Path(settings.results) / run.folder}: this run is {state}{why}")
+    return (STALE, found.why[0]) if stale else (MISSING, "; ".join(found.why))

@@ -19,8 +19,8 @@ from mtcsirl.errors import UserError
 from mtcsirl.files.storage import read_parquet, write_csv, write_parquet
 from mtcsirl.results.correlation import epic_distance, epic_values, nuisance, remove, views
 from mtcsirl.results.statistics import Array, cluster_bootstrap
+from mtcsirl.rewards.adapter import ground_truth
 from mtcsirl.rewards.learned import LearnedReward, check_learned, load_learned_reward
-from mtcsirl.rewards.mixture import ground_truth
 from mtcsirl.rewards.networks import RewardNetwork
 from mtcsirl.settings.runs import DemonstrationRunSettings, ScoreRunSettings
 from mtcsirl.transitions import RewardFunction, Transitions

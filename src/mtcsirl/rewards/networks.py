@@ -13,7 +13,6 @@ import torch
 from torch import Tensor
 
 from mtcsirl.errors import UserError
-from mtcsirl.irl.losses import bottleneck_information
 from mtcsirl.transitions import Transitions
 
 HEAD_BOUND = 0.01
@@ -29,6 +28,14 @@ class Output(NamedTuple):
     """gamma h(s') - h(s), 0 without shaping."""
     information: Tensor
     """KL of the bottleneck in nats, 0 without one."""
+
+
+def bottleneck_information(mean: Tensor, log_std: Tensor) -> Tensor:
+    """KL(N(mean, std^2) || N(0, 1)) in nats, summed over z; [..., Z] -> [...].
+
+    Sum over z of (mean^2 + std^2 - 1) / 2 - log std. Source: Peng et al. (2018), equation 4, and their code.
+    """
+    return 0.5 * (mean.square() + torch.exp(2.0 * log_std) - 1.0 - 2.0 * log_std).sum(-1)
 
 
 class Layers:

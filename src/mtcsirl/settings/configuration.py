@@ -187,6 +187,8 @@ class ExpertSettings(RewardScaleSettings):
     curriculum: bool = key(
         True, "weight the ground-truth cs-reward by r_ave / R_MAX, as section 3.3 does for f", paper=False
     )
+    curriculum_window: int = key(256, "window of r_ave", unit="environment steps", gt=0)
+    curriculum_maximum: float = key(10.0, "R_MAX of the curriculum: 10 is the most that a task pays", gt=0, le=10)
 
 
 class BaselineSettings(RewardScaleSettings):

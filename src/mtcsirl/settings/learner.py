@@ -35,6 +35,7 @@ class LearnerSettings(Frozen):
     """The part of SAC that every agent of the suite shares (the paper's Table 5)."""
 
     hidden_sizes: Sizes = key((256, 256), "hidden layers of actor and critics", unit="units", paper=(256, 256))
+    critics: int = key(2, "critics of an agent; their least value counts", unit="networks", absent=2, ge=1)
     policy_learning_rate: float = key(1.0e-3, "Adam step size of the actor", paper=3.0e-4, gt=0)
     critic_learning_rate: float = key(1.0e-3, "Adam step size of the critics", paper=3.0e-4, gt=0)
     temperature_learning_rate: float = key(

@@ -31,7 +31,9 @@ class AgentRunSettings(Frozen):
     cs_weight: float = Field(
         default=0.0, ge=0, description="weight of the cs-reward (ground truth or learned) beside r_task"
     )
-    curriculum: bool = Field(default=False, description="weight the cs-reward by r_ave / R_MAX over 256 steps")
+    curriculum: bool = Field(default=False, description="weight the cs-reward by r_ave / R_MAX")
+    curriculum_window: int = Field(default=256, gt=0, description="environment steps of r_ave")
+    curriculum_maximum: float = Field(default=10.0, gt=0, le=10, description="R_MAX, as a reward per step")
     warm_up_success: float = Field(
         default=0.0, ge=0, le=1, description="the cs-reward counts from the first time that recent episodes succeed so"
     )
@@ -41,7 +43,7 @@ class AgentRunSettings(Frozen):
     scripted_noise: float = Field(default=0.0, ge=0, description="standard deviation of the noise on them")
     held_share: float = Field(default=0.0, ge=0, le=1, description="share of blocks with a random action held")
     held_steps: int = Field(default=16, gt=0, description="environment steps of a block")
-    held_until: int = Field(default=0, ge=0, description="no such block from this environment step on")
+    held_until: float = Field(default=0.0, ge=0, le=1, description="no such block after this share of the budget")
     evaluation: EvaluationSettings = Field(default_factory=EvaluationSettings)
     gates: GateSettings = Field(default_factory=GateSettings)
     progress: ProgressSettings = Field(default_factory=ProgressSettings)
@@ -106,12 +108,14 @@ def expert_run(settings: Settings, task: str, cs_reward: str) -> AgentRunSetting
         expert.steps,
         cs_weight=expert.cs_weight.get(cs_reward, 1.0) * expert.cs_weight_factor.get(cs_reward, {}).get(task, 1.0),
         curriculum=expert.curriculum,
+        curriculum_window=expert.curriculum_window,
+        curriculum_maximum=expert.curriculum_maximum,
         warm_up_success=expert.warm_up_success,
         warm_up_episodes=expert.warm_up_episodes,
         warm_up_steps=granted(expert.warm_up_steps, task),
         held_share=granted(expert.held_share.get(cs_reward, {"default": 0.0}), task),
         held_steps=expert.held_steps,
-        held_until=int(expert.held_until * granted(expert.steps, task)),
+        held_until=expert.held_until,
     )
     return sliced(run, unread("train_expert", cs_reward=cs_reward))
 

@@ -1,6 +1,7 @@
 """What the three stages that train one agent share."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 from mtcsirl.agents.jobs import AgentJob
@@ -26,8 +27,13 @@ def agent_task(
 
 def train(job: AgentJob, task: Task) -> None:
     """Train one agent."""
-    with running(task) as needed:
-        if needed:
+    with running(task) as stopwatch:
+        if stopwatch is not None:
             events = task.output / "events" if job.settings.progress.tensorboard else None
-            (agent,) = train_agents([job], checkpoints=[task.output / CHECKPOINT], events=events)
+            (agent,) = train_agents(
+                [replace(job, made_from=task.identity.hash)],
+                checkpoints=[task.output / CHECKPOINT],
+                stopwatch=stopwatch,
+                events=events,
+            )
             agent.save(task.output)

@@ -28,8 +28,8 @@ def collect_demonstrations(
     source = look_at(expert, POLICY)
     made_from = identity(run.stage, run.about, settings, {"expert": source.hash})
     files = {name: expert / name for name in POLICY}
-    with running(Task(made_from, settings, output, {"expert": source.bytes}, files, wanted)) as needed:
-        if needed:
+    with running(Task(made_from, settings, output, {"expert": source.bytes}, files, wanted)) as stopwatch:
+        if stopwatch is not None:
             policy, cs = load_policy(expert), shown.cs_reward
             frame = collect(policy, shown.task, shown.target, settings, seed=shown.seed, cs_reward=cs)
             storage.write_parquet(output / FILE, frame)

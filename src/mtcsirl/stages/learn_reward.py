@@ -44,7 +44,17 @@ def learn_reward(
     inputs = {role: look_at(file.parent, [file.name]) for role, file in shown.items()}
     made_from = identity(STAGE, learning._asdict(), settings, {role: one.hash for role, one in inputs.items()})
     task = Task(made_from, settings, output, {role: one.bytes for role, one in inputs.items()}, shown, wanted)
-    with running(task) as needed:
-        if needed:
+    with running(task) as stopwatch:
+        if stopwatch is not None:
             about = {"experiment": learning.experiment, "source": learning.source}
-            run_irl(output, learning.method, learning.cs_reward, demonstrations, learning.seed, settings, about=about)
+            run_irl(
+                output,
+                learning.method,
+                learning.cs_reward,
+                demonstrations,
+                learning.seed,
+                settings,
+                about=about,
+                run=made_from.hash,
+                stopwatch=stopwatch,
+            )

@@ -66,22 +66,22 @@ def look_at(folder: Path, names: Sequence[str]) -> Input:
 
 
 @contextmanager
-def running(task: Task) -> Iterator[bool]:
+def running(task: Task) -> Iterator[Stopwatch | None]:
     """Hold the folder while the block fills it, if that is still to be done; then sign.
 
-    Yields False where a finished run of the same identity is there already: an orphan of a workflow that was killed
-    may have ended meanwhile.
+    Waits for a process that works there, which may be an orphan of a workflow that was killed. Yields None where a
+    finished run of the same identity is there already, else the watch that measures its cost.
     """
     stopwatch = Stopwatch()
     planned(task)
-    with storage.locked(task.output):
+    with storage.locked(task.output, wait=True):
         if finished(task):
             _LOG.info("%s: already there, made from the same", task.output)
             write_marker(task.output, task.identity.hash)
-            yield False
+            yield None
             return
         begin(task)
-        yield True
+        yield stopwatch
         sign(task, stopwatch)
 
 
@@ -110,13 +110,13 @@ def begin(task: Task) -> None:
     write_marker(task.output, None)
 
 
-def sign(task: Task, stopwatch: Stopwatch, *, agents: int = 1) -> None:
+def sign(task: Task, stopwatch: Stopwatch, *, agents: int = 1, lockstep: Sequence[str] = ()) -> None:
     """Leave settings, provenance, record and marker beside the results of a run, one of ``agents`` made at once.
 
     The checkpoint goes last: until then nothing is lost that was computed.
     """
     storage.write_json(task.output / "settings.json", task.settings.model_dump(mode="json"))
-    write_provenance(task.output, stopwatch, task.files, agents=agents)
+    write_provenance(task.output, stopwatch, task.files, agents=agents, lockstep=lockstep)
     left = checksums(task.output, result_files(task.output))
     storage.write_text(task.output / FILE, dumps(Record(task.identity, left, task.read)))
     write_marker(task.output, task.identity.hash)

@@ -42,8 +42,8 @@ def score_reward(
     files = {"reward": reward / WEIGHTS, "samples": reward / "samples.parquet"}
     for role, folders in (("expert", experts), ("baseline", baselines)):
         files |= {f"{role}_{index}": folder / "policy.safetensors" for index, folder in enumerate(folders)}
-    with running(Task(made_from, settings, output, read, files, wanted)) as needed:
-        if needed:
+    with running(Task(made_from, settings, output, read, files, wanted)) as stopwatch:
+        if stopwatch is not None:
             score(settings, reward, experts, baselines, *scoring, output)
 
 

@@ -7,10 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack, contextmanager
+from dataclasses import replace
 from functools import singledispatch
 from itertools import groupby
 from pathlib import Path
 
+from mtcsirl.agents.finite import NotFiniteError
 from mtcsirl.agents.jobs import AgentJob, common_settings
 from mtcsirl.agents.training import train_agents
 from mtcsirl.errors import UserError
@@ -116,10 +118,18 @@ def _train(batch: list[AgentRun], settings: Settings, results: Path, workers: in
     jobs: list[AgentJob] = []
     for run in batch:
         job, about, inputs = job_of(run, settings, results)
-        jobs.append(job)
         tasks.append(agent_task(run.stage, about, job, results / run.folder, None, inputs))
+        jobs.append(replace(job, made_from=tasks[-1].identity.hash))
         begin(tasks[-1])
     checkpoints = [task.output / CHECKPOINT for task in tasks]
-    for agent, task in zip(train_agents(jobs, checkpoints=checkpoints, log=log, workers=workers), tasks, strict=True):
+    try:
+        trained = train_agents(jobs, checkpoints=checkpoints, stopwatch=stopwatch, log=log, workers=workers)
+    except NotFiniteError as error:
+        healthy = [run for index, run in enumerate(batch) if index not in error.agents]
+        if healthy and len(healthy) < len(batch):
+            log(f"{error}; going on without it")
+            _train(healthy, settings, results, workers, log)
+        raise
+    for agent, task in zip(trained, tasks, strict=True):
         agent.save(task.output)
-        sign(task, stopwatch, agents=len(batch))
+        sign(task, stopwatch, agents=len(batch), lockstep=agent.lockstep)

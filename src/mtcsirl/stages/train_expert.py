@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from mtcsirl.agents.jobs import AgentJob
-from mtcsirl.rewards.mixture import ground_truth
+from mtcsirl.rewards.adapter import ground_truth
 from mtcsirl.settings.runs import AgentRunSettings
 from mtcsirl.stages.agents import agent_task, train
 from mtcsirl.study.runs import Expert

@@ -230,7 +230,8 @@ class IrlRun(Run[IrlRunSettings]):
 
     def settings(self, settings: Settings) -> IrlRunSettings:
         """The slice of the configuration that the run depends on."""
-        return irl_run(varied(settings, self.variant), self.experiment, {task for task, _ in self.members}, self.method)
+        tasks = {task for task, _ in self.members}
+        return irl_run(varied(settings, self.variant), self.experiment, tasks, self.method)
 
 
 def demonstrations_role(index: int, task: str, target: int) -> str:

@@ -1,12 +1,15 @@
 """One cell of a table of results: ours over seeds, the paper's number and how the two compare."""
 
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, field
+from typing import Any, Literal
 
 import numpy as np
 import pandas as pd
+from scipy import stats
 
-from mtcsirl.results.rows import BELOW_GATE, DUPLICATED, FOREIGN, INCOMPLETE, MISSING, matrix, select
+from mtcsirl.names import KEPT
+from mtcsirl.results.notes import Note, lacks_notes
+from mtcsirl.results.rows import BELOW_GATE, DUPLICATED, FOREIGN, INCOMPLETE, MISSING, STALE, matrix, select
 from mtcsirl.results.statistics import (
     UNKNOWN,
     Estimate,
@@ -20,15 +23,27 @@ from mtcsirl.results.statistics import (
 )
 
 DASH = "–"
-LINES = ("", "95 % t-interval", "paper", "ours in its prediction")
-"""Labels of a cell's lines; the first is that of its row. Prediction: 95 % interval for as many new seeds as ours."""
 PAPER_DIGITS = 2
 RESAMPLES = 500
-MARKS = {"below": "†", "missing": "‡", "doubtful": "§"}
+EXTREME = 0.999
+"""Two spreads whose ratio of variances lies beyond this quantile of F are no spreads of the same kind."""
+MARKS = {"below": "†", "missing": "‡", "doubtful": "§", "incomplete": "¶", "stale": "‖", "diverged": "×"}
+"""Doubt about agents, printed with their number."""
 MARK_TEXTS = {
     "below": "† agents below their gate; they count in the mean",
     "missing": "‡ missing agents",
-    "doubtful": "§ agents left out: their evaluation is incomplete, or another seed's or run's",
+    "doubtful": "§ agents left out: the evaluation repeats another seed's, or names another run than its folder",
+    "incomplete": "¶ agents left out: their evaluation lacks episodes or numbers",
+    "stale": "‖ agents left out: made with other settings, code or inputs than the study's",
+    "diverged": "× agents with episodes in which the simulation diverged",
+}
+Comparison = Literal["", "inside", "outside", "uninformative"]
+SIGNS: dict[Comparison, str] = {"": "", "inside": "∈", "outside": "∉", "uninformative": "?"}
+SIGN_TEXTS: dict[Comparison, str] = {
+    "inside": "∈ our mean lies inside the paper's 95 % prediction interval for as many new seeds as ours",
+    "outside": "∉ our mean lies outside the paper's 95 % prediction interval for as many new seeds as ours",
+    "uninformative": "? uninformative: the paper prints no spread that predicts ours, or a spread so far from ours "
+    "(ratio of variances beyond the 99.9 % quantile of F) that the two are not of the same kind",
 }
 
 
@@ -36,8 +51,8 @@ MARK_TEXTS = {
 class Cell:
     """Ours: mean and std over seeds, t-interval of the mean; the paper's, and where a replication should fall.
 
-    ``below``, ``missing`` and ``doubtful`` count agents (seed x task), ``expected`` seeds. A seed of which one task is
-    not usable has no mean over tasks and is left out of ``ours.n``.
+    ``marks``: how many agents (seed x task) are in doubt, by kind; ``expected``: seeds. A seed of which one task is not
+    usable has no mean over tasks and is left out of ``ours.n``.
     """
 
     ours: Summary
@@ -47,36 +62,34 @@ class Cell:
     deterministic: float
     iqm: Estimate
     expected: int
-    below: int
-    missing: int
-    doubtful: int
+    marks: dict[str, int] = field(default_factory=dict)
 
     @property
-    def inside(self) -> bool | None:
-        """Whether our mean lies in the paper's 95 % prediction interval; None where there is none to judge by."""
-        if np.isnan(self.prediction.low) or np.isnan(self.ours.mean):
-            return None
-        return self.prediction.contains(self.ours.mean)
+    def comparison(self) -> Comparison:
+        """Where our mean lies as the paper predicts it; "" where one of the two is not there."""
+        if np.isnan(self.paper.mean) or np.isnan(self.ours.mean):
+            return ""
+        if np.isnan(self.prediction.low) or extreme_ratio(self.ours, self.paper):
+            return "uninformative"
+        return "inside" if self.prediction.contains(self.ours.mean) else "outside"
 
-    @property
-    def marks(self) -> dict[str, int]:
-        """Kinds of doubt in this cell and their counts."""
-        return {kind: getattr(self, kind) for kind in MARKS if getattr(self, kind)}
+    def ours_text(self, digits: int = 2, factor: float = 1.0, *, usual: int = 0) -> str:
+        """As in "0.86±0.05 (n=5)"; a ``usual`` n is left out. ``factor`` 100 prints shares as percent."""
+        if self.ours.n == 0:
+            return DASH
+        return _spread(self.ours, digits, digits, factor) + (f" (n={self.ours.n})" if self.ours.n != usual else "")
 
-    def lines(self, digits: int = 2, factor: float = 1.0) -> tuple[str, str, str, str]:
-        """The cell as the texts of ``LINES``. ``factor`` 100 prints shares as percent.
+    def paper_text(self, digits: int = 2, factor: float = 1.0) -> str:
+        """As in "0.73±0.07"; spreads keep the two digits that the paper prints: its smallest, 0.01 %, is not 0."""
+        return _spread(self.paper, digits, PAPER_DIGITS, factor)
 
-        The paper's spreads keep the two digits that it prints: its smallest, 0.01 %, is not 0.
-        """
-        marks = "".join(f" {MARKS[kind]}{count}" for kind, count in self.marks.items())
-        ours = DASH if self.ours.n == 0 else f"{_spread(self.ours, digits, digits, factor)}, n={self.ours.n}"
-        bounds = _bounds(self.prediction, PAPER_DIGITS, factor)
-        return (
-            ours + marks,
-            _bounds(self.interval, digits, factor),
-            _spread(self.paper, digits, PAPER_DIGITS, factor),
-            {None: DASH, True: f"inside {bounds}", False: f"outside {bounds}"}[self.inside],
-        )
+    def interval_text(self, digits: int = 2, factor: float = 1.0) -> str:
+        """The t-interval of our mean."""
+        return _bounds(self.interval, digits, factor)
+
+    def prediction_text(self, factor: float = 1.0) -> str:
+        """The paper's prediction interval."""
+        return _bounds(self.prediction, PAPER_DIGITS, factor)
 
     def numbers(self) -> dict[str, Any]:
         """The cell as one row of a data frame."""
@@ -94,24 +107,42 @@ class Cell:
             "paper_std": self.paper.std,
             "prediction_low": self.prediction.low,
             "prediction_high": self.prediction.high,
-            "inside": "" if self.inside is None else str(self.inside).lower(),
+            "in_prediction": self.comparison,
             "seeds_expected": self.expected,
-            "agents_below_gate": self.below,
-            "agents_missing": self.missing,
-            "agents_doubtful": self.doubtful,
+            "agents_below_gate": self.marks.get("below", 0),
+            **{f"agents_{kind}": self.marks.get(kind, 0) for kind in MARKS if kind != "below"},
         }
+
+
+def unusable(rows: pd.DataFrame) -> tuple[Note, ...]:
+    """What incomplete agents lack and why stale ones are stale, by their folders."""
+    found = select(rows, status=(INCOMPLETE, STALE))[["folder", "lacks"]].drop_duplicates()
+    return lacks_notes(found.itertuples(index=False, name=None))
+
+
+def extreme_ratio(first: Summary, second: Summary, quantile: float = EXTREME) -> bool:
+    """Whether s1^2 / s2^2 (the larger above) lies beyond the ``quantile`` of F(n1 - 1, n2 - 1).
+
+    A spread of 0 beside one that is not 0 always does; unknown spreads never do.
+    """
+    if first.n < 2 or second.n < 2 or np.isnan(first.std) or np.isnan(second.std):
+        return False
+    (small, below), (large, above) = sorted(((first.std, first.n), (second.std, second.n)))
+    if small == 0:
+        return bool(large > 0)
+    return bool((large / small) ** 2 > stats.f.ppf(quantile, above - 1, below - 1))
 
 
 def make_cell(rows: pd.DataFrame, metric: str, paper: Summary, scale: float = 1.0) -> Cell:
     """The cell of one agent over its seeds and tasks: ``metric`` / ``scale`` of its evaluation ``rows``.
 
     Episodes were averaged per run; here tasks are averaged per seed, then seeds. ``paper`` is in units of the result; a
-    printed spread of 0 predicts nothing.
+    printed spread of 0 predicts nothing. Rows without ``metric`` give an empty cell of which no agent is expected.
     """
+    rows = select(rows, kept=KEPT)
     chosen = select(rows, metric=metric, policy="stochastic")
     ours = summarise(per_seed(chosen) / scale)
     greedy = per_seed(select(rows, metric=metric, policy="deterministic")) / scale
-    status = chosen["status"]
     return Cell(
         ours=ours,
         interval=_possible(t_interval(ours), metric),
@@ -120,10 +151,22 @@ def make_cell(rows: pd.DataFrame, metric: str, paper: Summary, scale: float = 1.
         deterministic=summarise(greedy).mean,
         iqm=_interquartile(chosen, scale),
         expected=chosen["seed"].nunique(),
-        below=int((status == BELOW_GATE).sum()),
-        missing=int((status == MISSING).sum()),
-        doubtful=int(status.isin([DUPLICATED, FOREIGN, INCOMPLETE]).sum()),
+        marks=_marks(chosen),
     )
+
+
+def _marks(rows: pd.DataFrame) -> dict[str, int]:
+    """Agents in doubt by kind, none that are 0; ``rows``: one per agent."""
+    status = rows["status"]
+    counts = {
+        "below": (status == BELOW_GATE).sum(),
+        "missing": (status == MISSING).sum(),
+        "doubtful": status.isin([DUPLICATED, FOREIGN]).sum(),
+        "incomplete": (status == INCOMPLETE).sum(),
+        "stale": (status == STALE).sum(),
+        "diverged": (rows["diverged"] > 0).sum(),
+    }
+    return {kind: int(count) for kind, count in counts.items() if count}
 
 
 def _possible(interval: Interval, metric: str) -> Interval:

@@ -3,13 +3,16 @@
 import pandas as pd
 
 from mtcsirl.names import EVALUATION_TARGET
-from mtcsirl.results.published import Published
+from mtcsirl.results.notes import left_out, remarks
+from mtcsirl.results.published import RATIO_TABLES, Published
 from mtcsirl.results.rows import select
 from mtcsirl.settings import Settings
-from mtcsirl.tables.cells import Cell, make_cell
-from mtcsirl.tables.table import Column, Entry, Table, result_table
+from mtcsirl.tables.cells import Cell, make_cell, unusable
+from mtcsirl.tables.entries import Entry, Layout, Quantity, Row, result_table
+from mtcsirl.tables.table import Table
 
 BASELINE = "SAC (task reward alone)"
+REMARK = "The paper prints no spread for this table, so there is no prediction interval to fall inside."
 
 
 def transfer_cell(rows: pd.DataFrame, published: Published, cs_reward: str, source: str, task: str) -> Cell:
@@ -29,20 +32,53 @@ def baseline_cell(rows: pd.DataFrame, published: Published, cs_reward: str, task
 def cross_transfer_table(
     name: str, cs_reward: str, rows: pd.DataFrame, settings: Settings, published: Published
 ) -> Table:
-    """Sources x tasks, the diagonal bold, plain SAC in the last row (the paper has it in parentheses)."""
-    tasks = settings.multi_target.tasks if cs_reward in settings.cs_rewards else ()
-    cells = {source: [transfer_cell(rows, published, cs_reward, source, task) for task in tasks] for source in tasks}
+    """Sources x tasks, the diagonal bold, plain SAC in the last row (the paper has it in parentheses).
+
+    A study without the cs-reward has no rows here, and the table says so.
+    """
+    tasks = settings.multi_target.tasks
+    cells = {
+        source: [transfer_cell(rows, published, cs_reward, source, task) for task in tasks] for source in tasks
+    } | {BASELINE: [baseline_cell(rows, published, cs_reward, task) for task in tasks]}
     body = [
-        (source, [Entry(cell, cs_reward, strong=task == source) for task, cell in zip(tasks, row, strict=True)])
-        for source, row in cells.items()
+        Row(
+            label,
+            tuple(Entry(cell, task, cs_reward, strong=task == label) for task, cell in zip(tasks, own, strict=True)),
+            rule=label == BASELINE,
+        )
+        for label, own in cells.items()
     ]
-    body.append((BASELINE, [Entry(baseline_cell(rows, published, cs_reward, task), cs_reward) for task in tasks]))
-    quantity = cs_reward.replace("_", " ")
-    caption = (
-        f"{quantity.capitalize()} cs-reward, several targets: {quantity} of a new agent divided by its target "
-        f"({published.target(cs_reward):g}); closer to 1 is better. Rows: the task on whose targets "
-        f"{', '.join(map(str, settings.multi_target.train_targets))} MT-CSIRL learned the reward; columns: the task on "
-        f"whose target {EVALUATION_TARGET}, not among them, a new agent was trained and evaluated."
+    layout = Layout(
+        "reward learned on",
+        tuple(Quantity(task, usual=len(settings.seeds)) for task in tasks),
+        (("", body),) if cs_reward in settings.cs_rewards else (),
     )
-    remark = "The paper prints no spread for this table, so there is no prediction interval to fall inside."
-    return result_table(name, caption, "reward learned on", [Column(task) for task in tasks], body, settings, [remark])
+    papers = published.data[RATIO_TABLES[cs_reward]]["tasks"]
+    notes = (
+        *unusable(rows),
+        *left_out("cs-reward", [cs_reward], settings.cs_rewards, label=_words),
+        *left_out("tasks", papers, tasks),
+        *remarks([REMARK]),
+    )
+    return result_table(name, _caption(cs_reward, published.target(cs_reward), settings), layout, settings, notes)
+
+
+def _caption(cs_reward: str, target: float, settings: Settings) -> str:
+    quantity = _words(cs_reward)
+    seen = settings.multi_target.train_targets
+    new = "which is among them" if EVALUATION_TARGET in seen else "not among them"
+    return (
+        f"{quantity.capitalize()} cs-reward, several targets: {quantity} of a new agent divided by its target "
+        f"({target:g}); closer to 1 is better. Rows: the task on whose {_targets(seen)} MT-CSIRL learned the "
+        "reward; "
+        f"columns: the task on whose target {EVALUATION_TARGET}, {new}, a new agent was trained and evaluated. "
+        f"Mean±std over n = {len(settings.seeds)} seeds where no other n is printed, and the paper's mean."
+    )
+
+
+def _words(name: str) -> str:
+    return name.replace("_", " ")
+
+
+def _targets(targets: tuple[int, ...]) -> str:
+    return f"target{'s' if len(targets) > 1 else ''} {', '.join(map(str, targets))}"

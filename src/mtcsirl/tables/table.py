@@ -1,123 +1,90 @@
-"""The layout that all tables share, and its three forms: CSV, Markdown, LaTeX with booktabs."""
+"""A table of the paper and its forms: CSV (every number), Markdown, LaTeX with booktabs, and JSON for the report."""
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import pandas as pd
 
-from mtcsirl.settings import Settings
-from mtcsirl.settings.template import deviations
-from mtcsirl.tables.cells import DASH, LINES, MARK_TEXTS, Cell
+from mtcsirl.errors import UserError
+from mtcsirl.results.notes import KINDS, Note, of_kind
+from mtcsirl.tables.grid import Column, Grid, Line
+from mtcsirl.tables.latex import grid_latex, latex
+from mtcsirl.tables.markdown import escape, grid_markdown
 
-SMOKE_NOTE = "smoke scale: numbers mean nothing"
-DIFFERS = "Differs from the paper: "
-LATEX = {
-    "\\": r"\textbackslash{}",
-    "&": r"\&",
-    "%": r"\%",
-    "$": r"\$",
-    "#": r"\#",
-    "_": r"\_",
-    "{": r"\{",
-    "}": r"\}",
-    "~": r"\textasciitilde{}",
-    "^": r"\textasciicircum{}",
-    "<": r"$<$",
-    ">": r"$>$",
-    "|": r"$|$",
-    "±": r"$\pm$",
-    "†": r"$^{\dagger}$",
-    "‡": r"$^{\ddagger}$",
-    "§": r"$^{\S}$",
-    "–": "--",
-    "×": r"$\times$",
-}
+INTERVALS = "Intervals behind it (95 %): of our mean (Student's t over seeds), and where the paper predicts it"
 
-
-@dataclass(frozen=True)
-class Column:
-    """One column: ``group`` is the heading it shares with its neighbours ("" for none)."""
-
-    title: str
-    group: str = ""
-
-    @property
-    def full_title(self) -> str:
-        """Both headings in one line."""
-        return f"{self.group}: {self.title}" if self.group else self.title
-
-
-@dataclass(frozen=True)
-class Line:
-    """One printed line: a label and a text per column; ``rule`` draws a rule above it, ``strong`` prints it bold."""
-
-    label: str
-    texts: tuple[str, ...]
-    rule: bool = False
-    strong: tuple[int, ...] = ()
+DIFFERS = "Settings that differ from the paper's"
 
 
 @dataclass(frozen=True)
 class Table:
-    """A table: printed lines for people, ``numbers`` (one row per cell) for programs, notes under both."""
+    """A table: a ``grid`` for people, ``numbers`` (one row per cell) for programs, notes under both.
+
+    ``intervals``: a second grid with the same labels, the intervals behind the numbers of the first.
+    """
 
     name: str
     caption: str
-    corner: str
-    columns: tuple[Column, ...]
-    lines: tuple[Line, ...]
-    numbers: pd.DataFrame
-    notes: tuple[str, ...] = ()
-    differences: tuple[str, ...] = ()
-    """The last notes in few words, for a page of paper: a study has more of them than fit below a table."""
+    grid: Grid
+    notes: tuple[Note, ...] = ()
+    intervals: Grid | None = None
+    numbers: pd.DataFrame = field(default_factory=pd.DataFrame)
 
     @property
     def title(self) -> str:
         """As in "Table 2"."""
         return self.name.replace("_", " ").capitalize()
 
+    @property
+    def columns(self) -> tuple[Column, ...]:
+        """The columns of the grid."""
+        return self.grid.columns
+
+    @property
+    def lines(self) -> tuple[Line, ...]:
+        """The lines of the grid."""
+        return self.grid.lines
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether the study has no line of it, or no run has reached any of its cells."""
+        return not self.lines or ("n" in self.numbers and not self.numbers["n"].any())
+
     def csv(self) -> pd.DataFrame:
-        """One row per cell with every number; the notes' scale is a column, so that the file cannot lose it."""
+        """One row per cell with every number; the scale is a column, so that the file cannot lose it."""
         return self.numbers
 
     def markdown(self) -> str:
-        """The table with its caption above and its notes below."""
-        head = [self.corner, *(column.full_title for column in self.columns)]
-        body = [head, [":--", *("--:" for _ in self.columns)]]
-        for line in self.lines:
-            texts = [f"**{text}**" if i in line.strong else text for i, text in enumerate(line.texts)]
-            body.append([line.label, *texts])
-        table = "\n".join("| " + " | ".join(_markdown(text) for text in row) + " |" for row in body)
-        notes = "\n".join(f"- {_markdown(note)}" for note in self.notes)
-        return f"**{self.title}.** {self.caption}\n\n{table}\n\n{notes}\n"
+        """The table with its caption above; below it notes, intervals, and what differs from the paper."""
+        own, differences = of_kind(self.notes, "scale", "gap", "mark", "remark"), of_kind(self.notes, "deviation")
+        parts = [f"**{self.title}.** {self.caption}", self._body(), *_items(own)]
+        if self.intervals is not None:
+            parts += [f"{INTERVALS}:", grid_markdown(self.intervals)]
+        if differences:
+            parts += [f"{DIFFERS}:", *_items(differences)]
+        return "\n\n".join(parts) + "\n"
+
+    def brief(self) -> str:
+        """The table with its caption and those notes that are its own: not the study's scale and deviations."""
+        notes = of_kind(self.notes, "gap", "mark", "remark")
+        return "\n\n".join([self.caption, self._body(), *_items(notes)])
 
     def latex(self) -> str:
-        """A ``table`` environment; needs the packages booktabs and graphicx."""
-        body = []
-        for line in self.lines:
-            texts = [rf"\textbf{{{_latex(t)}}}" if i in line.strong else _latex(t) for i, t in enumerate(line.texts)]
-            body.append("\\midrule\n" * line.rule + " & ".join([_latex(line.label), *texts]) + r" \\")
-        head = " & ".join(_latex(text) for text in [self.corner, *(column.title for column in self.columns)])
-        label = self.name.replace("_", ":")
-        notes = [_latex(note) + r"\par" for note in self.notes if not note.startswith(DIFFERS)]
-        if self.differences:
-            text = f"Settings that differ from the paper's, which stand in parentheses: {'; '.join(self.differences)}"
-            notes.append(r"\tiny " + _latex(text) + r"\par")
+        """A ``table`` environment; needs the packages booktabs and graphicx. Deviations stand in few words."""
+        notes = [latex(note.text) + r"\par" for note in of_kind(self.notes, "scale", "gap", "mark", "remark")]
+        short = [note.short or note.text for note in of_kind(self.notes, "deviation")]
+        if short:
+            text = f"{DIFFERS}, which stand in parentheses: {'; '.join(short)}"
+            notes.append(r"\tiny " + latex(text) + r"\par")
+        body = [r"\resizebox{\ifdim\width>\textwidth\textwidth\else\width\fi}{!}{%", *grid_latex(self.grid)]
         return "\n".join(
             [
                 r"\begin{table}[htbp]",
                 r"\centering\footnotesize",
-                rf"\caption{{{_latex(self.caption)}}}\label{{{label}}}",
-                r"\resizebox{\ifdim\width>\textwidth\textwidth\else\width\fi}{!}{%",
-                rf"\begin{{tabular}}{{l{'r' * len(self.columns)}}}",
-                r"\toprule",
-                *self._latex_groups(),
-                head + r" \\",
-                r"\midrule",
-                *body,
-                r"\bottomrule",
-                r"\end{tabular}}",
+                rf"\caption{{{latex(self.caption)}}}\label{{{self.name.replace('_', ':')}}}",
+                *([*body[:-1], body[-1] + "}"] if self.lines else [rf"\emph{{{latex(self._why_empty())}}}"]),
                 r"\par\medskip\raggedright\scriptsize",
                 *notes,
                 r"\end{table}",
@@ -125,102 +92,40 @@ class Table:
             ]
         )
 
-    def _latex_groups(self) -> list[str]:
-        """Group headings with a rule under each."""
-        if not any(column.group for column in self.columns):
-            return []
-        names, rules, start = [], [], 2
-        for group, width in _runs(column.group for column in self.columns):
-            names.append(rf"\multicolumn{{{width}}}{{c}}{{{_latex(group)}}}")
-            rules.append(rf"\cmidrule(lr){{{start}-{start + width - 1}}}" if group else "")
-            start += width
-        return [" & ".join(["", *names]) + r" \\", "".join(rules)]
+    def as_json(self) -> dict[str, Any]:
+        """What people read, as data: caption, columns, lines, intervals, notes with their kinds."""
+        notes = [{"kind": note.kind, "text": note.text, "short": note.short} for note in self.notes]
+        intervals = None if self.intervals is None else self.intervals.as_json()
+        own = {"name": self.name, "caption": self.caption}
+        return own | self.grid.as_json() | {"intervals": intervals, "notes": notes}
+
+    @classmethod
+    def from_json(cls, data: Any, path: Path | str = "table") -> "Table":
+        """The table that ``as_json`` made, without its numbers.
+
+        Raises:
+            UserError: it is something else.
+        """
+        try:
+            intervals = None if data["intervals"] is None else Grid.from_json(data["intervals"])
+            notes = tuple(_note(note) for note in data["notes"])
+            return cls(str(data["name"]), str(data["caption"]), Grid.from_json(data), notes, intervals)
+        except (KeyError, TypeError, ValueError) as error:
+            raise UserError(f"{path}: not a table of this suite ({error}); delete it and make it again") from error
+
+    def _body(self) -> str:
+        return grid_markdown(self.grid) if self.lines else f"*{self._why_empty()}*"
+
+    def _why_empty(self) -> str:
+        return "; ".join(note.text for note in of_kind(self.notes, "gap")) or "nothing to show"
 
 
-@dataclass(frozen=True)
-class Entry:
-    """A cell in a column: how it is printed and what it is called in the CSV."""
-
-    cell: Cell
-    metric: str
-    digits: int = 2
-    factor: float = 1.0
-    strong: bool = False
-
-    def lines(self) -> tuple[str, ...]:
-        """The texts of ``LINES``."""
-        return self.cell.lines(self.digits, self.factor)
+def _items(notes: tuple[Note, ...]) -> list[str]:
+    """One list in Markdown; nothing without notes."""
+    return ["\n".join(f"- {escape(note.text)}" for note in notes)] if notes else []
 
 
-def entry_lines(label: str, entries: Sequence[Entry], rule: bool = True) -> list[Line]:
-    """The lines of one row of cells: ours, the t-interval, the paper's and, where it predicts any, the prediction."""
-    first, *further = zip(*(entry.lines() for entry in entries), strict=True)
-    strong = tuple(i for i, entry in enumerate(entries) if entry.strong)
-    if set(further[-1]) == {DASH}:
-        further.pop()
-    lines = [Line(name, tuple(text)) for name, text in zip(LINES[1:], further, strict=False)]
-    return [Line(label, tuple(first), rule, strong), *lines]
-
-
-def result_table(
-    name: str,
-    caption: str,
-    corner: str,
-    columns: Sequence[Column],
-    rows: Sequence[tuple[str, Sequence[Entry]]],
-    settings: Settings,
-    remarks: Sequence[str] = (),
-) -> Table:
-    """A table of cells: lines per row, one CSV row per cell, marks explained, scale and deviations below."""
-    lines = [line for i, (label, entries) in enumerate(rows) for line in entry_lines(label, entries, rule=i > 0)]
-    numbers: list[dict[str, Any]] = [
-        {"row": label, "column": column.full_title, "metric": entry.metric, **entry.cell.numbers()}
-        for label, entries in rows
-        for column, entry in zip(columns, entries, strict=True)
-    ]
-    cells = [entry.cell for _, entries in rows for entry in entries]
-    used = {kind for cell in cells for kind in cell.marks}
-    marks = [text for kind, text in MARK_TEXTS.items() if kind in used]
-    frame = pd.DataFrame(numbers).assign(scale=settings.scale)
-    lacking = sum(cell.ours.n < cell.expected for cell in cells)
-    gaps = [f"incomplete: {lacking} of {len(cells)} cells lack seeds"] if lacking else []
-    notes = (*scale_notes(settings), *gaps, *remarks, *marks, *deviation_notes(settings))
-    return Table(name, caption, corner, tuple(columns), tuple(lines), frame, notes, differences(settings))
-
-
-def scale_notes(settings: Settings) -> list[str]:
-    """What every artefact says first: the scale, and that smoke numbers mean nothing."""
-    if settings.scale == "smoke":
-        return [SMOKE_NOTE]
-    return [f"scale {settings.scale}; {len(settings.seeds)} seeds ({', '.join(map(str, settings.seeds))})"]
-
-
-def deviation_notes(settings: Settings) -> list[str]:
-    """Every setting that differs from the paper's, one line each."""
-    found = [str(deviation) for deviation in deviations(settings)]
-    return [DIFFERS + text for text in found] or ["All settings that the paper gives are the paper's"]
-
-
-def differences(settings: Settings) -> tuple[str, ...]:
-    """The same without what the setting is, as in "sac.discount = 0.9 (0.99)"."""
-    found = deviations(settings)
-    return tuple(str(one).removesuffix(f": {one.text}").replace("(paper: ", "(") for one in found)
-
-
-def _runs(items: Iterable[str]) -> list[tuple[str, int]]:
-    """Equal neighbours as (item, count)."""
-    runs: list[tuple[str, int]] = []
-    for item in items:
-        if runs and runs[-1][0] == item:
-            runs[-1] = (item, runs[-1][1] + 1)
-        else:
-            runs.append((item, 1))
-    return runs
-
-
-def _markdown(text: str) -> str:
-    return text.replace("|", "\\|")
-
-
-def _latex(text: str) -> str:
-    return "".join(LATEX.get(character, character) for character in text)
+def _note(data: Mapping[str, Any]) -> Note:
+    if data["kind"] not in KINDS:
+        raise ValueError(f"unknown kind of note {data['kind']!r}")
+    return Note(data["kind"], str(data["text"]), str(data["short"]))

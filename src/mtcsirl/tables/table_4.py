@@ -2,18 +2,25 @@
 
 import pandas as pd
 
-from mtcsirl.results.published import Published, in_paper_order, load_published
+from mtcsirl.names import agent_label
+from mtcsirl.results.notes import left_out, remarks
+from mtcsirl.results.published import PAPER_ORDER, Published, in_paper_order, load_published
 from mtcsirl.results.rows import select
 from mtcsirl.settings import Settings
-from mtcsirl.tables.cells import Cell, make_cell
-from mtcsirl.tables.table import Column, Entry, Table, result_table
+from mtcsirl.tables.cells import Cell, make_cell, unusable
+from mtcsirl.tables.entries import Entry, Layout, Quantity, Row, result_table
+from mtcsirl.tables.table import Table
 
 CAPTION = (
     "MT-CSIRL+LT, both rewards learned: agents from scratch on the learned task reward and the learned cs-reward, on "
     "the tasks (target {target}) whose demonstrations the IRL has seen. Ratio: metric divided by its target, closer to "
-    "1 is better; success: percent of episodes."
+    "1 is better; success: percent of episodes. Mean±std over n seeds, ours beside the paper's."
 )
 REMARK = "The paper prints a spread for success alone, so only there a prediction interval exists."
+QUANTITIES = (
+    Quantity("ratio to the target"),
+    Quantity("success (%)", digits=1, factor=100.0, same_agents=True),
+)
 
 
 def learned_task_cell(
@@ -27,22 +34,29 @@ def learned_task_cell(
 
 
 def table_4(rows: pd.DataFrame, settings: Settings, published: Published | None = None) -> Table:
-    """Build the table from ``evaluation_rows``."""
+    """Build the table from ``evaluation_rows``: one section per cs-reward; none without MT-CSIRL+LT."""
     published = published or load_published()
-    columns, kinds = [], []
+    sections = []
     for cs in in_paper_order(settings.cs_rewards) if "mt_csirl_lt" in settings.methods else ():
         name = cs.replace("_", " ")
-        columns += [Column(f"{name} ratio", name), Column("success rate (%)", name)]
-        kinds += [(cs, cs, 2, 1.0), (cs, "success", 1, 100.0)]
-    body = [
-        (
-            task,
-            [
-                Entry(learned_task_cell(rows, settings, published, task, cs, metric), metric, digits, factor)
-                for cs, metric, digits, factor in kinds
-            ],
-        )
-        for task in settings.multi_task.train_tasks
-    ]
+        columns = {cs: f"{name}: {name} ratio", "success": f"{name}: success rate (%)"}
+        body = [
+            Row(
+                task,
+                tuple(
+                    Entry(learned_task_cell(rows, settings, published, task, cs, metric), column, metric)
+                    for metric, column in columns.items()
+                ),
+            )
+            for task in settings.multi_task.train_tasks
+        ]
+        sections.append((f"{name}, target {published.target(cs):g}", body))
+    notes = (
+        *unusable(rows),
+        *left_out("method", ["mt_csirl_lt"], settings.methods, label=agent_label),
+        *left_out("tasks", published.data["table_4"]["rows"], settings.multi_task.train_tasks),
+        *left_out("cs-reward", PAPER_ORDER, settings.cs_rewards, label=lambda name: name.replace("_", " ")),
+        *remarks([REMARK]),
+    )
     caption = CAPTION.format(target=settings.multi_task.train_targets[0])
-    return result_table("table_4", caption, "Task", columns, body, settings, [REMARK])
+    return result_table("table_4", caption, Layout("Task", QUANTITIES, tuple(sections)), settings, notes)

@@ -4,10 +4,12 @@ from typing import Any
 
 import pandas as pd
 
+from mtcsirl.results.notes import deviation_notes, remarks, study_note
 from mtcsirl.results.published import Published, load_published
 from mtcsirl.settings import Settings
 from mtcsirl.tables.cells import DASH
-from mtcsirl.tables.table import Column, Line, Table, deviation_notes, differences, scale_notes
+from mtcsirl.tables.grid import Column, Grid, Line
+from mtcsirl.tables.table import Table
 
 CAPTION = "Hyperparameters of SAC: this study's, the paper's, and whether they are the same."
 REMARKS = (
@@ -27,9 +29,9 @@ def table_5(rows: pd.DataFrame | None, settings: Settings, published: Published 
             for name, ours, paper in entries
         ]
     ).assign(scale=settings.scale)
-    notes = (*scale_notes(settings), *REMARKS, *deviation_notes(settings))
-    columns = (Column("ours"), Column("paper"), Column("same"))
-    return Table("table_5", CAPTION, "Description", columns, tuple(lines), frame, notes, differences(settings))
+    notes = (study_note(settings), *remarks(REMARKS), *deviation_notes(settings))
+    grid = Grid("Description", (Column("ours"), Column("paper"), Column("same")), tuple(lines))
+    return Table("table_5", CAPTION, grid, notes, numbers=frame)
 
 
 def _entries(settings: Settings, paper: dict[str, Any]) -> list[tuple[str, Any, Any]]:

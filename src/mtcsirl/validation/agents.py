@@ -43,10 +43,9 @@ def train_agents(
 ) -> FusedSac:
     """One new agent per f on r_task + f, for ``steps`` environment steps each; agent i has the i-th reward."""
     count = len(rewards)
-    learner = FusedSac(
-        count, sac, seeds=range(seed, seed + count), observation_size=STATE_SIZE, action_size=ACTION_SIZE
-    )
-    replay = Replay(count, steps, seed=seed, observation_size=STATE_SIZE, action_size=ACTION_SIZE)
+    seeds = range(seed, seed + count)
+    learner = FusedSac(count, sac, seeds=seeds, observation_size=STATE_SIZE, action_size=ACTION_SIZE)
+    replay = Replay(seeds, steps, observation_size=STATE_SIZE, action_size=ACTION_SIZE)
     random = np.random.default_rng((seed, 2))
     due = 0.0
 

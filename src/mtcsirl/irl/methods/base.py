@@ -1,6 +1,6 @@
 """What the methods are composed from, sized by the settings."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -9,11 +9,10 @@ import torch
 from mtcsirl.irl.discriminator import Discriminator
 from mtcsirl.irl.losses import (
     Adversarial,
-    GradientPenalty,
     InformationBottleneck,
-    Loss,
     PenaltyPoints,
     entire_reward_logit,
+    gradient_penalty_at,
 )
 from mtcsirl.rewards.networks import RewardNetwork
 from mtcsirl.settings import DiscriminatorSettings, IrlSettings
@@ -52,28 +51,29 @@ class Setup:
             **extra,
         }
 
-    def shared(self, architecture: dict[str, Any], loss: Loss) -> Discriminator:
+    def shared(self, architecture: dict[str, Any], loss: Adversarial) -> Discriminator:
         """A discriminator whose reward all tasks share."""
         return self._discriminator(architecture, loss, rewards=1, stream=0)
 
-    def per_task(self, architecture: dict[str, Any], loss: Loss) -> Discriminator:
+    def per_task(self, architecture: dict[str, Any], loss: Adversarial) -> Discriminator:
         """A discriminator with T rewards, one per task."""
         return self._discriminator(architecture, loss, rewards=self.tasks, stream=1)
 
-    def _discriminator(self, architecture: dict[str, Any], loss: Loss, rewards: int, stream: int) -> Discriminator:
+    def _discriminator(
+        self, architecture: dict[str, Any], loss: Adversarial, rewards: int, stream: int
+    ) -> Discriminator:
         weights, noise = np.random.SeedSequence((self.seed, stream)).generate_state(2)
         network = RewardNetwork(architecture, rewards, torch.Generator().manual_seed(int(weights)))
         random = torch.Generator().manual_seed(int(noise))
         return Discriminator(network, loss, self.irl.discriminator.learning_rate, random)
 
 
-def penalised(loss: Loss, weight: float, points: PenaltyPoints) -> Loss:
+def penalised(loss: Adversarial, weight: float, points: PenaltyPoints) -> Adversarial:
     """``loss`` with a gradient penalty, or as it is where the weight is 0."""
-    return GradientPenalty(loss, weight, points) if weight > 0 else loss
+    return replace(loss, penalties=(*loss.penalties, gradient_penalty_at(points, weight))) if weight > 0 else loss
 
 
-def bottlenecked(settings: DiscriminatorSettings) -> InformationBottleneck:
+def bottlenecked(settings: DiscriminatorSettings) -> Adversarial:
     """Equation 1's loss under VAIRL's constraint KL <= I_c."""
-    return InformationBottleneck(
-        Adversarial(entire_reward_logit), settings.information_constraint, settings.initial_beta, settings.beta_step
-    )
+    constraint = InformationBottleneck(settings.information_constraint, settings.initial_beta, settings.beta_step)
+    return Adversarial(entire_reward_logit, bottleneck=constraint)

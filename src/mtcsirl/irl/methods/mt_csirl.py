@@ -3,6 +3,7 @@
 from mtcsirl.irl.discriminator import Method
 from mtcsirl.irl.losses import Adversarial, interpolated_points, known_task_reward_logit
 from mtcsirl.irl.methods.base import Setup, penalised
+from mtcsirl.rewards.mixture import mixed
 
 
 def mt_csirl(setup: Setup) -> Method:
@@ -13,7 +14,7 @@ def mt_csirl(setup: Setup) -> Method:
     return Method(
         name="mt_csirl",
         discriminators={"f": setup.shared(setup.perceptron(), loss)},
-        policy_reward=lambda task_reward, learned, alpha: task_reward + alpha * learned["f"],
+        policy_reward=lambda task_reward, learned, alpha: mixed(task_reward, learned["f"], alpha),
         knows_task_reward=True,
         uses_curriculum=True,
     )

@@ -5,6 +5,7 @@ from torch import Tensor
 from mtcsirl.irl.discriminator import Method
 from mtcsirl.irl.losses import Adversarial, entire_reward_logit, interpolated_points
 from mtcsirl.irl.methods.base import Setup, penalised
+from mtcsirl.rewards.mixture import mixed
 
 
 def half_of_entire_reward_logit(f: Tensor, task_reward: Tensor, log_pi: Tensor, temperature: Tensor) -> Tensor:
@@ -27,7 +28,7 @@ def mt_csirl_lt(setup: Setup) -> Method:
             "task": setup.per_task(setup.perceptron(), loss),
             "f": setup.shared(setup.perceptron(), loss),
         },
-        policy_reward=lambda task_reward, learned, alpha: learned["task"] + alpha * learned["f"],
+        policy_reward=lambda task_reward, learned, alpha: mixed(learned["task"], learned["f"], alpha),
         knows_task_reward=False,
         uses_curriculum=setup.irl.unknown_task_curriculum,
     )
