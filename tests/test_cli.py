@@ -20,9 +20,10 @@ from mtcsirl.settings import Settings
 from mtcsirl.settings.loading import load
 from mtcsirl.settings.runs import AgentRunSettings, expert_run
 from mtcsirl.study.design import design
+from mtcsirl.study.keys import identity_of
 from mtcsirl.study.outputs import OUTPUTS
 from mtcsirl.study.plan import Rates, cost, load_rates, plan, wall_hours
-from mtcsirl.study.runs import Expert, identity_of
+from mtcsirl.study.runs import Expert
 from mtcsirl.study.status import DONE, FAILED, RUNNING, STALE, WAITING, run_status, seconds_left, study_status
 
 KEY = ["--task", "reach", "--seed", "0"]

@@ -125,3 +125,8 @@ DIVERGED = "diverged"
 def distance_metric(cs_reward: str) -> str:
     """The metric E|m - target| of a cs-reward's measure m: minus its mean unweighted ground-truth reward."""
     return f"{cs_reward}_distance"
+
+
+CURVE_COLUMNS = ("task", "target", "step", "metric", "value")
+DIAGNOSTIC_COLUMNS = ("task", "target", "step", "discriminator", "metric", "value")
+"""Of an IRL run's curve.csv and diagnostics.csv; rows on the generator have no discriminator."""

@@ -58,7 +58,7 @@ def test_a_learning_rate_that_explodes_ends_the_run_and_leaves_the_checkpoint_fr
     training = Training([job], checkpoints=[file], log=lambda line: None)
     from mtcsirl.agents import resume
 
-    resume.restore(training, lines.append)
+    resume.restore(training, [resume.load(job, file)], lines.append)
     assert training.step >= 100, "the last checkpoint is of a step with numbers"
     assert training.learner.broken_agents() == {}
     assert all(np.isfinite(value) for _, _, value in training.curves[0])

@@ -166,7 +166,8 @@ def test_killed_run_remembers_whose_warm_up_is_over(small_run, tmp_path):
     killed.step = 100
     resume.save(killed)
     resumed = Training(jobs, checkpoints=files, log=lambda line: None)
-    resume.restore(resumed, lambda line: None)
+    saved = [resume.load(job, file) for job, file in zip(jobs, files, strict=True)]
+    resume.restore(resumed, saved, lambda line: None)
     assert resumed.reward.counts.tolist() == killed.reward.counts.tolist() == [True, True]
     assert resumed.recent == [[True, False], [False, True]]
     for training in (killed, resumed):

@@ -16,7 +16,7 @@ from mtcsirl.rewards.learned import load_learned_reward
 from mtcsirl.settings import Settings
 from mtcsirl.study.design import ARTEFACTS, design
 from mtcsirl.study.outputs import OUTPUTS
-from mtcsirl.study.runs import Baseline, Expert, IrlRun, Study, Transfer
+from mtcsirl.study.runs import Baseline, Expert, IrlRun, Runs, Transfer
 from mtcsirl.study.status import DONE, study_status
 from tests.dag.conftest import RENDERED, RENDERS, SMOKE, Snakemake, needs_rendering
 
@@ -30,7 +30,7 @@ Agent = Expert | Baseline | Transfer | IrlRun
 
 
 @pytest.fixture(scope="module")
-def study(smoke_settings: Settings) -> Study:
+def study(smoke_settings: Settings) -> Runs:
     return design(smoke_settings)
 
 
@@ -44,11 +44,11 @@ def figures(smoke: Path, smoke_settings: Settings) -> Path:
     return smoke / smoke_settings.figures
 
 
-def agents(study: Study) -> list[Agent]:
+def agents(study: Runs) -> list[Agent]:
     return [run for run in study if isinstance(run, Agent)]
 
 
-def test_every_run_left_every_file(results: Path, study: Study) -> None:
+def test_every_run_left_every_file(results: Path, study: Runs) -> None:
     for run in study:
         for name in OUTPUTS[run.stage]:
             assert (results / run.folder / name).stat().st_size > 0, f"{run.folder}/{name}"
@@ -60,13 +60,13 @@ def test_nothing_unfinished_is_left(results: Path, smoke: Path) -> None:
     assert not list((smoke / "paper_figs").rglob("*.tmp"))
 
 
-def test_settings_are_the_slice_of_the_study(results: Path, study: Study, smoke_settings: Settings) -> None:
+def test_settings_are_the_slice_of_the_study(results: Path, study: Runs, smoke_settings: Settings) -> None:
     for run in study:
         written = storage.read_json(results / run.folder / "settings.json")
         assert written == run.settings(smoke_settings).model_dump(mode="json")
 
 
-def test_provenance_names_commit_versions_machine_and_cost(results: Path, study: Study) -> None:
+def test_provenance_names_commit_versions_machine_and_cost(results: Path, study: Runs) -> None:
     for run in study:
         found = storage.read_json(results / run.folder / "provenance.json")
         assert {"commit", "versions", "machine", "cost", "inputs"} <= set(found)
@@ -75,7 +75,7 @@ def test_provenance_names_commit_versions_machine_and_cost(results: Path, study:
         assert 0 < found["cost"]["peak_memory_mib"] < 1200, "the memory that the rules ask for"
 
 
-def test_inputs_are_traced_to_their_bytes(results: Path, study: Study) -> None:
+def test_inputs_are_traced_to_their_bytes(results: Path, study: Runs) -> None:
     for run in study.demonstrations:
         inputs = storage.read_json(results / run.folder / "provenance.json")["inputs"]
         assert storage.checksum(results / run.expert.folder / "policy.safetensors") in inputs.values()
@@ -85,7 +85,7 @@ def test_inputs_are_traced_to_their_bytes(results: Path, study: Study) -> None:
 
 
 def test_evaluation_has_one_row_per_policy_episode_and_metric(
-    results: Path, study: Study, smoke_settings: Settings
+    results: Path, study: Runs, smoke_settings: Settings
 ) -> None:
     episodes = smoke_settings.evaluation.episodes
     for run in agents(study):
@@ -107,13 +107,13 @@ def test_evaluation_has_one_row_per_policy_episode_and_metric(
         assert set(successes) <= {0.0, 1.0}
 
 
-def test_the_baseline_has_no_cs_reward(results: Path, study: Study) -> None:
+def test_the_baseline_has_no_cs_reward(results: Path, study: Runs) -> None:
     for run in study.baselines:
         frame = pd.read_csv(results / run.folder / "evaluation.csv", keep_default_na=False)
         assert set(frame["cs_reward"]) == {""}
 
 
-def test_gates_say_what_was_asked_and_what_was_reached(results: Path, study: Study) -> None:
+def test_gates_say_what_was_asked_and_what_was_reached(results: Path, study: Runs) -> None:
     gates = {
         "train_expert": "expert", "train_sac": "sac", "collect_demonstrations": "expert",
         "learn_reward": "generator", "transfer": "sac",
@@ -126,7 +126,7 @@ def test_gates_say_what_was_asked_and_what_was_reached(results: Path, study: Stu
         assert gate["limits"]["success"] == 0.9
 
 
-def test_curves_are_tidy(results: Path, study: Study, smoke_settings: Settings) -> None:
+def test_curves_are_tidy(results: Path, study: Runs, smoke_settings: Settings) -> None:
     for run in agents(study):
         curve = pd.read_csv(results / run.folder / "curve.csv")
         own = ["task", "target"] if isinstance(run, IrlRun) else []
@@ -137,21 +137,21 @@ def test_curves_are_tidy(results: Path, study: Study, smoke_settings: Settings) 
             assert curve["step"].max() <= run.settings(smoke_settings).steps  # type: ignore[attr-defined]
 
 
-def test_policies_act(results: Path, study: Study) -> None:
+def test_policies_act(results: Path, study: Runs) -> None:
     for run in (*study.experts, *study.baselines, *study.transfers):
         action = load_policy(results / run.folder).act(np.zeros(39, np.float32))
         assert action.shape == (4,)
         assert (np.abs(action) <= 1).all()
 
 
-def test_each_generator_is_stored(results: Path, study: Study) -> None:
+def test_each_generator_is_stored(results: Path, study: Runs) -> None:
     for run in study.irl_runs:
         stored = {path.name for path in (results / run.folder / "policies").iterdir()}
         for task, target in run.members:
             assert {f"{task}-t{target}.safetensors", f"{task}-t{target}.json"} <= stored
 
 
-def test_learned_rewards_load_and_differ_by_method(results: Path, study: Study) -> None:
+def test_learned_rewards_load_and_differ_by_method(results: Path, study: Runs) -> None:
     weights = {}
     for run in study.irl_runs:
         load_learned_reward(results / run.folder)
@@ -161,7 +161,7 @@ def test_learned_rewards_load_and_differ_by_method(results: Path, study: Study) 
     assert len(set(weights.values())) == len(weights)
 
 
-def test_demonstrations_are_the_experts_episodes(results: Path, study: Study, smoke_settings: Settings) -> None:
+def test_demonstrations_are_the_experts_episodes(results: Path, study: Runs, smoke_settings: Settings) -> None:
     for run in study.demonstrations:
         frame = storage.read_parquet(results / run.folder / "demonstrations.parquet")
         own = run.settings(smoke_settings)
@@ -172,7 +172,7 @@ def test_demonstrations_are_the_experts_episodes(results: Path, study: Study, sm
         assert frame["step"].max() == own.episode_steps - 1  # type: ignore[attr-defined]
 
 
-def test_scores_name_transitions_controls_and_statistics(results: Path, study: Study) -> None:
+def test_scores_name_transitions_controls_and_statistics(results: Path, study: Runs) -> None:
     for run in study.scores:
         scores = pd.read_csv(results / run.folder / "scores.csv")
         assert {"expert", "sac", "generator", "uniform"} <= set(scores["transitions"])
@@ -222,13 +222,13 @@ def test_the_report_shows_every_artefact(results: Path) -> None:
 
 
 def test_status_of_a_finished_study(
-    smoke: Path, smoke_settings: Settings, study: Study, monkeypatch: pytest.MonkeyPatch
+    smoke: Path, smoke_settings: Settings, study: Runs, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(smoke)
     assert {status.state for status in study_status(study, smoke_settings)} == {DONE}
 
 
-def test_the_same_seed_gives_the_same_bytes(results: Path, study: Study, smoke: Path, tmp_path: Path) -> None:
+def test_the_same_seed_gives_the_same_bytes(results: Path, study: Runs, smoke: Path, tmp_path: Path) -> None:
     """The verb alone, outside the DAG, against what the DAG made."""
     run = study.experts[0]
     settings = (results / run.folder / "settings.json").read_text()
@@ -240,7 +240,7 @@ def test_the_same_seed_gives_the_same_bytes(results: Path, study: Study, smoke: 
 
 
 def test_a_table_of_partial_results_marks_what_is_missing(
-    results: Path, study: Study, smoke_settings: Settings, tmp_path: Path
+    results: Path, study: Runs, smoke_settings: Settings, tmp_path: Path
 ) -> None:
     lost = study.baselines[0].folder if study.baselines[0].task == "reach-wall" else "sac/reach-wall-t0/s0"
     copy = tmp_path / "results"
@@ -253,7 +253,7 @@ def test_a_table_of_partial_results_marks_what_is_missing(
 
 
 def test_every_irl_run_is_drawn_and_diagnosed(
-    smoke: Path, snakemake: Snakemake, results: Path, figures: Path, study: Study
+    smoke: Path, snakemake: Snakemake, results: Path, figures: Path, study: Runs
 ) -> None:
     done = snakemake("--cores", "2", "diagnostics", *SMOKE)
     assert done.returncode == 0, done.stderr[-3000:]

@@ -64,6 +64,7 @@ def test_at_every_file_event_of_a_run(stage: Stage, tmp_path: Path) -> None:
     assert {path.name for path in whole.glob("*")} >= {"settings.json", "provenance.json"}
     assert not list(whole.glob("checkpoint*"))
     events = int((tmp_path / "events").read_text())
+    print(f"{events} events")
     assert events > 30, "the harness sees what the run does"
     chosen = range(events) if LONG else sorted(random.Random(0).sample(range(events), 8))
     for event in chosen:

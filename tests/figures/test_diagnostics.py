@@ -7,8 +7,8 @@ import pytest
 
 from mtcsirl.figures.diagnostics import CHANCE, caption, draw
 from mtcsirl.figures.style import figure_bytes
+from mtcsirl.names import DIAGNOSTIC_COLUMNS
 from mtcsirl.results.notes import SMOKE_NOTE
-from mtcsirl.study.outputs import DIAGNOSTIC_COLUMNS
 
 MEMBERS = (("reach", 1), ("drawer-close", 2))
 OF_GENERATOR = [

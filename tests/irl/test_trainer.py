@@ -18,8 +18,8 @@ from mtcsirl.irl.resume import load_state, state
 from mtcsirl.irl.rollout import collect
 from mtcsirl.irl.run import CHECKPOINT, learn_reward, make_trainer
 from mtcsirl.irl.trainer import IrlTrainer
+from mtcsirl.names import CURVE_COLUMNS, DIAGNOSTIC_COLUMNS
 from mtcsirl.rewards.learned import load_learned_reward
-from mtcsirl.study.outputs import CURVE_COLUMNS, DIAGNOSTIC_COLUMNS
 from mtcsirl.transitions import Transitions
 from tests.irl.conftest import MEMBERS, irl_settings
 

@@ -15,7 +15,8 @@ from mtcsirl.names import DIVERGED, KEPT, distance_metric
 from mtcsirl.results.rows import KEY, OK, POLICIES, ROW_COLUMNS, agents, metrics, run_key
 from mtcsirl.rewards.ground_truth import COMMON_SENSE_REWARDS
 from mtcsirl.settings import Settings
-from mtcsirl.study.runs import AnyRun, Demonstrations, Runs, identity_of
+from mtcsirl.study.keys import identity_of
+from mtcsirl.study.runs import AnyRun, Demonstrations, Runs
 
 Means = Callable[[dict[str, Any]], dict[str, float]]
 """Means of the metrics of an agent, from its key."""

@@ -9,7 +9,8 @@ from mtcsirl.settings import Settings
 from mtcsirl.settings.loading import load
 from mtcsirl.study.ablations import ABLATIONS
 from mtcsirl.study.design import ARTEFACTS, CLAIMS, FIGURE_TASKS, design, variants
-from mtcsirl.study.runs import KINDS, Baseline, Expert, Runs, read_folder
+from mtcsirl.study.keys import read_folder
+from mtcsirl.study.runs import KINDS, Baseline, Expert, Runs
 
 SCALES = ("smoke", "desk", "paper")
 

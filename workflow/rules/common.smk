@@ -21,7 +21,8 @@ from mtcsirl.settings.template import as_json
 from mtcsirl.study.ablations import ABLATIONS
 from mtcsirl.study.artefacts import HEAT_MAPS, settle_artefacts
 from mtcsirl.study.design import ARTEFACTS, CLAIMS, design
-from mtcsirl.study.runs import FIELDS, Baseline, Demonstrations, Expert, IrlRun, Score, Transfer
+from mtcsirl.study.keys import FIELDS
+from mtcsirl.study.runs import Baseline, Demonstrations, Expert, IrlRun, Score, Transfer
 from mtcsirl.study.standing import settle
 
 try:

@@ -4,15 +4,35 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 from torch import Tensor
 
 from mtcsirl.agents.jobs import AgentJob
+from mtcsirl.agents.replay import Replay
+from mtcsirl.agents.selection import Selection
+from mtcsirl.episodes.policy import Policy
 from mtcsirl.files.checkpoint import Checkpoint, load_checkpoint, prefixed, save_checkpoint, without_prefix
+from mtcsirl.files.provenance import Stopwatch
+from mtcsirl.rewards.mixture import PolicyReward
 
-if TYPE_CHECKING:
-    from mtcsirl.agents.training import Training
+
+class Resumable(Protocol):
+    """What of a training its checkpoints hold; see ``agents.training.Training``."""
+
+    jobs: list[AgentJob]
+    checkpoints: list[Path | None]
+    learner: Any
+    replay: Replay
+    reward: PolicyReward
+    selections: list[Selection]
+    recent: list[list[bool]]
+    curves: list[list[tuple[int, str, float]]]
+    stopwatch: Stopwatch
+    step: int
+
+    def policy(self, agent: int) -> Policy:
+        """A frozen copy of an agent as it is now."""
 
 
 def load(job: AgentJob, file: Path | None) -> Checkpoint | None:
@@ -20,14 +40,14 @@ def load(job: AgentJob, file: Path | None) -> Checkpoint | None:
     return None if file is None else load_checkpoint(file, run=job.fingerprint())
 
 
-def save(training: Training) -> None:
+def save(training: Resumable) -> None:
     """Write, for every agent, all that the rest of its run depends on; environments start afresh at every episode."""
     for agent, file in enumerate(training.checkpoints):
         if file is not None:
             save_checkpoint(file, *_state(training, agent), run=training.jobs[agent].fingerprint())
 
 
-def restore(training: Training, saved: Sequence[Checkpoint | None], log: Callable[[str], None]) -> None:
+def restore(training: Resumable, saved: Sequence[Checkpoint | None], log: Callable[[str], None]) -> None:
     """Put every agent where it was ``saved``; agents in lockstep are of the same step."""
     for agent, checkpoint in enumerate(saved):
         if checkpoint is not None:
@@ -36,7 +56,7 @@ def restore(training: Training, saved: Sequence[Checkpoint | None], log: Callabl
         log(f"resumed at step {training.step}")
 
 
-def _state(training: Training, agent: int) -> Checkpoint:
+def _state(training: Resumable, agent: int) -> Checkpoint:
     tensors = prefixed("learner", training.learner.state_dict(agent))
     tensors |= prefixed("replay", training.replay.state_dict(agent))
     tensors |= prefixed("curriculum", training.reward.alpha.state_dict(agent))
@@ -54,7 +74,7 @@ def _state(training: Training, agent: int) -> Checkpoint:
     return tensors, notes
 
 
-def _put(training: Training, agent: int, tensors: dict[str, Tensor], notes: dict[str, Any]) -> None:
+def _put(training: Resumable, agent: int, tensors: dict[str, Tensor], notes: dict[str, Any]) -> None:
     training.stopwatch.add(notes["spent"])
     training.learner.load_state_dict(agent, without_prefix("learner", tensors))
     training.replay.load_state_dict(agent, without_prefix("replay", tensors))

@@ -98,7 +98,7 @@ class Training:
         workers: int = 0,
     ) -> None:
         self.jobs = list(jobs)
-        self.checkpoints = [None] * len(self.jobs) if checkpoints is None else list(checkpoints)
+        self.checkpoints: list[Path | None] = list(checkpoints or [None] * len(self.jobs))
         self.settings = settings = shared_settings(self.jobs)
         seeds, own = [job.seed for job in jobs], [job.settings for job in jobs]
         self.step = 0

@@ -25,7 +25,7 @@ def _draw(parsed: argparse.Namespace) -> None:
     from mtcsirl.figures.diagnostics import caption, draw
     from mtcsirl.figures.style import look, quantity
     from mtcsirl.files import storage
-    from mtcsirl.study.outputs import CURVE_COLUMNS, DIAGNOSTIC_COLUMNS
+    from mtcsirl.names import CURVE_COLUMNS, DIAGNOSTIC_COLUMNS
 
     settings = study_settings(parsed)
     about = storage.read_json(parsed.folder / "reward.json")

@@ -27,11 +27,11 @@ from mtcsirl.irl.methods.base import Setup
 from mtcsirl.irl.resume import load_state, state
 from mtcsirl.irl.rollout import World
 from mtcsirl.irl.trainer import IrlTrainer
+from mtcsirl.names import CURVE_COLUMNS, DIAGNOSTIC_COLUMNS
 from mtcsirl.rewards.adapter import ground_truth
 from mtcsirl.rewards.ground_truth import COMMON_SENSE_REWARDS
 from mtcsirl.rewards.learned import LearnedReward, save_learned_reward
 from mtcsirl.settings.runs import IrlRunSettings
-from mtcsirl.study.outputs import CURVE_COLUMNS, DIAGNOSTIC_COLUMNS
 from mtcsirl.transitions import Transitions
 from mtcsirl.worlds.environments import OBSERVATION_MAPS
 

@@ -25,7 +25,7 @@ from mtcsirl.settings import Settings
 from mtcsirl.settings.template import deviations
 from mtcsirl.study.design import ARTEFACTS, design
 from mtcsirl.study.outputs import OUTPUTS
-from mtcsirl.study.runs import AnyRun, Study
+from mtcsirl.study.runs import AnyRun, Runs
 from mtcsirl.tables.table import Table
 
 SUMMARY_TARGETS = {"claims": "the verdicts on all claims", "report": "this page", "all": "everything"}
@@ -112,7 +112,7 @@ def _links(page: Path, files: tuple[tuple[str, Path], ...]) -> tuple[tuple[str, 
     return tuple((text, Path(os.path.relpath(file, page.parent)).as_posix()) for text, file in files if file.is_file())
 
 
-def _targets(settings: Settings, study: Study, provenance: dict[AnyRun, dict[str, Any]]) -> Iterator[TargetLine]:
+def _targets(settings: Settings, study: Runs, provenance: dict[AnyRun, dict[str, Any]]) -> Iterator[TargetLine]:
     """Every artefact with the cost of the runs that it needs, as measured; artefacts share runs."""
     wanted = {name: (_title(name), design(settings, name)) for name in ARTEFACTS}
     for name, (text, own) in (wanted | {name: (text, study) for name, text in SUMMARY_TARGETS.items()}).items():
@@ -120,7 +120,7 @@ def _targets(settings: Settings, study: Study, provenance: dict[AnyRun, dict[str
         yield TargetLine(name, text, len(costs), sum(own.jobs().values()), sum(costs))
 
 
-def _what_was_run(settings: Settings, study: Study, provenance: dict[AnyRun, dict[str, Any]]) -> WhatWasRun:
+def _what_was_run(settings: Settings, study: Runs, provenance: dict[AnyRun, dict[str, Any]]) -> WhatWasRun:
     return WhatWasRun(
         scale=settings.scale,
         seeds=settings.seeds,
@@ -140,7 +140,7 @@ def _machine(found: dict[str, Any]) -> str:
     return f"{found['processor']}, {found['cores']} cores, {found['system']}, Python {found['python']}"
 
 
-def _stage_cost(stage: str, study: Study, provenance: dict[AnyRun, dict[str, Any]]) -> StageCost:
+def _stage_cost(stage: str, study: Runs, provenance: dict[AnyRun, dict[str, Any]]) -> StageCost:
     costs = [found["cost"] for run, found in provenance.items() if run.stage == stage]
     return StageCost(
         stage=stage,
@@ -167,7 +167,7 @@ def _claim(found: dict[str, Any]) -> Claim:
     return Claim(**texts, units=units, measured=measured(found["units"]))
 
 
-def _gates(study: Study, results: Path) -> tuple[GateLine, ...]:
+def _gates(study: Runs, results: Path) -> tuple[GateLine, ...]:
     """One line per kind of agent, task and cs-reward; an IRL run has one gate per generator."""
     groups: dict[tuple[str, str, str], list[dict[str, Any]]] = {}
     for run in study:

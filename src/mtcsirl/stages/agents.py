@@ -7,7 +7,7 @@ from pathlib import Path
 from mtcsirl.agents.jobs import AgentJob
 from mtcsirl.agents.training import train_agents
 from mtcsirl.stages.running import CHECKPOINT, Input, Task, running
-from mtcsirl.study.runs import identity
+from mtcsirl.study.keys import identity
 
 
 def agent_task(

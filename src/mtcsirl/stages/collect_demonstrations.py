@@ -13,7 +13,8 @@ from mtcsirl.episodes.policy import load_policy
 from mtcsirl.files import storage
 from mtcsirl.settings.runs import DemonstrationRunSettings
 from mtcsirl.stages.running import Task, look_at, running
-from mtcsirl.study.runs import Demonstrations, identity
+from mtcsirl.study.keys import identity
+from mtcsirl.study.runs import Demonstrations
 
 FILE = "demonstrations.parquet"
 POLICY = ("policy.json", "policy.safetensors")

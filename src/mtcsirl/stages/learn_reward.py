@@ -8,7 +8,8 @@ from mtcsirl.episodes.demonstrations import member_of
 from mtcsirl.irl.run import learn_reward as run_irl
 from mtcsirl.settings.runs import IrlRunSettings
 from mtcsirl.stages.running import Task, look_at, running
-from mtcsirl.study.runs import demonstrations_role, identity
+from mtcsirl.study.keys import identity
+from mtcsirl.study.runs import demonstrations_role
 
 STAGE = "learn_reward"
 

@@ -72,9 +72,9 @@ def running(task: Task) -> Iterator[Stopwatch | None]:
     Waits for a process that works there, which may be an orphan of a workflow that was killed. Yields None where a
     finished run of the same identity is there already, else the watch that measures its cost.
     """
-    stopwatch = Stopwatch()
     planned(task)
     with storage.locked(task.output, wait=True):
+        stopwatch = Stopwatch()
         if finished(task):
             _LOG.info("%s: already there, made from the same", task.output)
             write_marker(task.output, task.identity.hash)

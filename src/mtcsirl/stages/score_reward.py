@@ -9,7 +9,7 @@ from mtcsirl.results.scoring import score
 from mtcsirl.rewards.learned import DESCRIPTION, WEIGHTS
 from mtcsirl.settings.runs import ScoreRunSettings
 from mtcsirl.stages.running import Input, Task, look_at, running
-from mtcsirl.study.runs import identity
+from mtcsirl.study.keys import identity
 
 STAGE = "score_reward"
 POLICY = ("policy.json", "policy.safetensors")

@@ -26,7 +26,7 @@ from mtcsirl.settings.base import identifying
 from mtcsirl.study.ablations import ABLATIONS
 from mtcsirl.study.code import artefact_code
 from mtcsirl.study.design import ARTEFACTS, CLAIMS, design
-from mtcsirl.study.runs import identity_of
+from mtcsirl.study.keys import identity_of
 from mtcsirl.study.standing import ABSENT, DONE, INCOMPLETE, STALE, Standing
 
 PLACES = {"results", "figures", "extensions"}

@@ -2,22 +2,14 @@
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from mtcsirl.errors import UserError
 from mtcsirl.names import EVALUATION_TARGET
 from mtcsirl.settings import Settings
 from mtcsirl.study.ablations import ABLATIONS
-from mtcsirl.study.runs import (
-    AnyRun,
-    Baseline,
-    Demonstrations,
-    Expert,
-    IrlRun,
-    Runs,
-    Score,
-    Transfer,
-)
+from mtcsirl.study.keys import Run
+from mtcsirl.study.runs import AnyRun, Baseline, Demonstrations, Expert, IrlRun, Runs, Score, Transfer
 
 FIGURE_TASKS = {
     "figure_2": "reach-wall",
@@ -212,13 +204,13 @@ def _runs(settings: Settings, ablation: str, name: str) -> Iterator[AnyRun]:
 
 def variants(settings: Settings, ablation: str) -> dict[str, Runs]:
     """The runs that each variant of an ablation shows, by the variant's name."""
-    return {name: _sorted(set(_runs(settings, ablation, name))) for name in ABLATIONS[ablation].variants}
+    return {name: _sorted(set[Run[Any]](_runs(settings, ablation, name))) for name in ABLATIONS[ablation].variants}
 
 
 def design(settings: Settings, artefact: str | None = None) -> Runs:
     """All runs of the study, or those that an artefact or an ablation needs; shared agents appear once."""
-    found: set[AnyRun] = set()
-    left = list(_shown(settings, artefact))
+    found: set[Run[Any]] = set()
+    left: list[Run[Any]] = list(_shown(settings, artefact))
     while left:
         run = left.pop()
         if run not in found:
@@ -244,7 +236,7 @@ def _shown(settings: Settings, artefact: str | None) -> Iterator[AnyRun]:
 Kind = TypeVar("Kind", bound=AnyRun)
 
 
-def _sorted(found: set[AnyRun]) -> Runs:
+def _sorted(found: set[Run[Any]]) -> Runs:
     def of(kind: type[Kind]) -> tuple[Kind, ...]:
         return tuple(sorted(run for run in found if isinstance(run, kind)))
 

@@ -3,10 +3,6 @@
 _RUN = ("settings.json", "provenance.json")
 _AGENT = ("policy.safetensors", "policy.json", "curve.csv", "evaluation.csv", "gate.json", *_RUN)
 
-CURVE_COLUMNS = ("task", "target", "step", "metric", "value")
-DIAGNOSTIC_COLUMNS = ("task", "target", "step", "discriminator", "metric", "value")
-"""Of an IRL run's curve.csv and diagnostics.csv; rows on the generator have no discriminator."""
-
 OUTPUTS: dict[str, tuple[str, ...]] = {
     "train_expert": _AGENT,
     "train_sac": _AGENT,

@@ -1,21 +1,12 @@
-"""What a run is: its key, the folder that mirrors it, its settings, what it reads and its identity.
-
-Pure data for the DAG, the command line, the cost plan and the tests. Imports no torch and touches no file.
-"""
+"""The kinds of run: what each is told, what it reads, and where it lands."""
 
 from __future__ import annotations
 
-import re
-from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from string import Formatter
-from typing import Any, ClassVar, Generic, TypeVar
+from typing import Any
 
-from mtcsirl.files.identity import Identity
 from mtcsirl.settings import Settings
-from mtcsirl.settings.base import Frozen, identifying
-from mtcsirl.settings.loading import merge, validate
 from mtcsirl.settings.runs import (
     AgentRunSettings,
     DemonstrationRunSettings,
@@ -28,85 +19,7 @@ from mtcsirl.settings.runs import (
     score_run,
     transfer_run,
 )
-from mtcsirl.study.ablations import changes, prefix
-from mtcsirl.study.code import code_of
-
-S = TypeVar("S", bound=Frozen, covariant=True)
-
-
-def varied(settings: Settings, variant: str) -> Settings:
-    """``settings`` with the changes of a variant, as in ``ablation_replay/latest``; the main study has none."""
-    return validate(Settings, merge(settings.model_dump(mode="json"), changes(variant))) if variant else settings
-
-
-class Run(ABC, Generic[S]):
-    """One job of the DAG whose settings are an ``S``."""
-
-    stage: ClassVar[str]
-    PATTERN: ClassVar[str]
-    """The folder below the results, with the key's names as fields; also the wildcards of the stage's rule."""
-
-    @property
-    @abstractmethod
-    def key(self) -> dict[str, Any]:
-        """The fields of ``PATTERN``."""
-
-    @abstractmethod
-    def settings(self, settings: Settings) -> S:
-        """The slice of the configuration that the run depends on."""
-
-    @property
-    def needs(self) -> Mapping[str, AnyRun]:
-        """The runs that this one reads, by role."""
-        return {}
-
-    @property
-    def about(self) -> dict[str, Any]:
-        """What the stage is told beside settings and inputs: the part of the key that its numbers depend on."""
-        return {name: value for name, value in self.key.items() if name != "variant"}
-
-    @property
-    def folder(self) -> str:
-        """Where the run lands, below the results folder."""
-        return self.PATTERN.format(**self.key)
-
-    def identity(self, settings: Settings) -> Identity:
-        """What the run is made from under ``settings``."""
-        own = self.settings(settings)
-        inputs = {role: identity_of(run, settings).hash for role, run in self.needs.items()}
-        return identity(self.stage, self.about, own, inputs)
-
-
-def identity(stage: str, about: Mapping[str, Any], own: Frozen, inputs: Mapping[str, str]) -> Identity:
-    """The identity of a run with the settings ``own`` over inputs, role -> hash of their identity."""
-    said = identifying(own)
-    return Identity(stage, dict(about), said, code_of(stage, said, about.get("method", "")), dict(inputs))
-
-
-_KNOWN: dict[tuple[AnyRun, int], tuple[Settings, Identity]] = {}
-
-
-def identity_of(run: AnyRun, settings: Settings) -> Identity:
-    """``run.identity(settings)``, computed once."""
-    place = run, id(settings)
-    if place not in _KNOWN:
-        _KNOWN[place] = settings, run.identity(settings)  # keeps ``settings`` alive, so that its id stays its own
-    return _KNOWN[place][1]
-
-
-def read_folder(pattern: str, folder: str) -> dict[str, str] | None:
-    """The key of a folder that ``pattern`` made; None if it is of another kind."""
-    parts = Formatter().parse(pattern)
-    found = re.fullmatch("".join(re.escape(text) + (_field(name) if name else "") for text, name, *_ in parts), folder)
-    return found.groupdict() if found else None
-
-
-FIELDS = {"variant": r"(?:ablations/\w+/\w+/)?", "target": r"\d+", "seed": r"\d+"}
-"""What a field of a pattern may be, where that is not any name."""
-
-
-def _field(name: str) -> str:
-    return rf"(?P<{name}>{FIELDS.get(name, '[^/]+?')})"
+from mtcsirl.study.keys import Run, key_of, varied
 
 
 @dataclass(frozen=True, order=True)
@@ -124,7 +37,7 @@ class Expert(Run[AgentRunSettings]):
     @property
     def key(self) -> dict[str, Any]:
         """The fields of ``PATTERN``."""
-        return _key(self, "cs_reward", "task", "target", "seed")
+        return key_of(self, "cs_reward", "task", "target", "seed")
 
     def settings(self, settings: Settings) -> AgentRunSettings:
         """The slice of the configuration that the run depends on."""
@@ -144,7 +57,7 @@ class Baseline(Run[AgentRunSettings]):
     @property
     def key(self) -> dict[str, Any]:
         """The fields of ``PATTERN``."""
-        return _key(self, "task", "target", "seed")
+        return key_of(self, "task", "target", "seed")
 
     def settings(self, settings: Settings) -> AgentRunSettings:
         """The slice of the configuration that the run depends on."""
@@ -162,7 +75,7 @@ class Demonstrations(Run[DemonstrationRunSettings]):
     @property
     def key(self) -> dict[str, Any]:
         """The fields of ``PATTERN``."""
-        return _key(self, "cs_reward", "task", "target", "seed")
+        return key_of(self, "cs_reward", "task", "target", "seed")
 
     @property
     def needs(self) -> Mapping[str, AnyRun]:
@@ -216,7 +129,7 @@ class IrlRun(Run[IrlRunSettings]):
     @property
     def key(self) -> dict[str, Any]:
         """The fields of ``PATTERN``."""
-        return _key(self, "experiment", "method", "cs_reward", "source", "seed")
+        return key_of(self, "experiment", "method", "cs_reward", "source", "seed")
 
     @property
     def members(self) -> tuple[tuple[str, int], ...]:
@@ -254,12 +167,15 @@ class Transfer(Run[AgentRunSettings]):
     @property
     def key(self) -> dict[str, Any]:
         """The fields of ``PATTERN``."""
-        return _reward_key(self.irl) | _key(self, "task", "target", "seed")
+        return _reward_key(self.irl) | key_of(self, "task", "target", "seed")
 
     @property
     def about(self) -> dict[str, Any]:
         """Which reward it is stands in the inputs."""
-        own = _key(self, "task", "target", "seed") | {"cs_reward": self.irl.cs_reward, "task_reward": self.task_reward}
+        own = key_of(self, "task", "target", "seed") | {
+            "cs_reward": self.irl.cs_reward,
+            "task_reward": self.task_reward,
+        }
         return {name: value for name, value in own.items() if name != "variant"}
 
     @property
@@ -317,10 +233,6 @@ KINDS: tuple[type[AnyRun], ...] = (Expert, Baseline, Demonstrations, IrlRun, Tra
 """In the order of the DAG's stages."""
 
 
-def _key(run: Any, *names: str) -> dict[str, Any]:
-    return {"variant": prefix(getattr(run, "variant", ""))} | {name: getattr(run, name) for name in names}
-
-
 def _reward_key(irl: IrlRun) -> dict[str, Any]:
     return {name: getattr(irl, name) for name in ("experiment", "method", "cs_reward", "source")}
 
@@ -358,6 +270,3 @@ class Runs:
         for run in self:
             counts[run.stage] = counts.get(run.stage, 0) + 1
         return counts
-
-
-Study = Runs

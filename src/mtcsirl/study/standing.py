@@ -3,11 +3,12 @@
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from mtcsirl.errors import UserError
 from mtcsirl.files.identity import Record, differences, lost, read_record, write_marker
 from mtcsirl.settings import Settings
-from mtcsirl.study.runs import AnyRun, identity_of
+from mtcsirl.study.keys import Run, identity_of
 
 ABSENT, INCOMPLETE, STALE, DONE = "absent", "incomplete", "stale", "done"
 
@@ -21,7 +22,7 @@ class Standing:
     record: Record | None = None
 
 
-def standing(run: AnyRun, settings: Settings, results: Path | str | None = None) -> Standing:
+def standing(run: Run[Any], settings: Settings, results: Path | str | None = None) -> Standing:
     """Hold the record in the folder of ``run`` against what ``settings`` and today's code ask for."""
     results = Path(settings.results if results is None else results)
     folder = results / run.folder
@@ -40,7 +41,7 @@ def standing(run: AnyRun, settings: Settings, results: Path | str | None = None)
     return _over_its_inputs(run, record, results)
 
 
-def _over_its_inputs(run: AnyRun, record: Record, results: Path) -> Standing:
+def _over_its_inputs(run: Run[Any], record: Record, results: Path) -> Standing:
     """A run of the same identity may have been made again elsewhere, with other bytes."""
     for role, needed in run.needs.items():
         try:
@@ -52,7 +53,7 @@ def _over_its_inputs(run: AnyRun, record: Record, results: Path) -> Standing:
     return Standing(DONE, (), record)
 
 
-def settle(runs: Iterable[AnyRun], settings: Settings) -> dict[str, str]:
+def settle(runs: Iterable[Run[Any]], settings: Settings) -> dict[str, str]:
     """Leave in every folder the marker of what stands there; returns the hash that each run must have, by folder.
 
     Markers are a workflow's view: rewritten from the records each time it is read, whatever happened in between.

@@ -7,9 +7,10 @@ from pathlib import Path
 from mtcsirl.errors import UserError
 from mtcsirl.files import storage
 from mtcsirl.settings import Settings
+from mtcsirl.study.keys import identity_of
 from mtcsirl.study.outputs import OUTPUTS
 from mtcsirl.study.plan import Rates, cost
-from mtcsirl.study.runs import AnyRun, Runs, identity_of
+from mtcsirl.study.runs import AnyRun, Runs
 from mtcsirl.study.standing import DONE, INCOMPLETE, STALE, standing
 
 RUNNING, FAILED, WAITING = "running", "failed", "waiting"
