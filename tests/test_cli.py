@@ -233,7 +233,7 @@ def test_status_follows_a_run(small: Settings, tmp_path: Path) -> None:
     assert (done.state, done.passed, done.seconds) == (DONE, False, 12.0)
     changed = small.model_copy(update={"expert": small.expert.model_copy(update={"steps": {"default": 601}})})
     assert run_status(run, changed).state == STALE
-    assert run_status(run, changed).says == "held_until: 300 -> 450; steps: 400 -> 601"
+    assert run_status(run, changed).says == "steps: 400 -> 601"
     storage.write_text(folder / "gate.json", "{")
     assert run_status(run, small).state == FAILED, "a truncated file"
     assert "changed since its run wrote it" in run_status(run, small).says

@@ -37,7 +37,7 @@ AGENT: dict[str, Any] = {
     "scripted_noise": 0.1,
     "held_share": 0.5,
     "held_steps": 4,
-    "held_until": 150,
+    "held_until": 0.8,
     "evaluation": EVALUATION,
     "progress": {"select_every": 60, "select_episodes": 1, "select_training_episodes": 1},
 }
@@ -105,16 +105,20 @@ OTHERS: dict[str, Any] = {
     "demonstration_episodes": 1,
     "warm_up_episodes": 2,
     "warm_up_success": 0.0,
-    "progress.select_training_episodes": 0,
+    "held_until": 0.4,
+    "curriculum_maximum": 5.0,
     "warm_up_steps": 60,
 }
 """Another value of a key; the rest is halved or turned round."""
+SEVERAL = {"progress.select_training_episodes": (0, 3, 5, 9)}
+"""Values of which one at least has to tell: which policy is the best of a few may be the same for some of them."""
 _TRIALS = {"scripted_steps": 0, "evaluation.episode_steps": 15, "progress.select_every": 30}
 WITH: dict[str, dict[str, Any]] = {
     "warm_up_steps": {"warm_up_success": 1.0, "warm_up_episodes": 99},
     "progress.select_every": _TRIALS,
     "progress.select_episodes": _TRIALS,
-    "progress.select_training_episodes": _TRIALS | {"progress.select_every": 15, "sac.policy_learning_rate": 0.1},
+    "progress.select_training_episodes": _TRIALS
+    | {"progress.select_every": 15, "steps": 300, "held_share": 1.0, "held_until": 1.0},
     "irl.curriculum_window": {"irl.unknown_task_curriculum": True},
     "irl.curriculum_maximum": {"irl.unknown_task_curriculum": True},
     "irl.curriculum": {"irl.unknown_task_curriculum": True},
@@ -168,7 +172,8 @@ class Kind:
         extra = {name: one for name, one in needed.items() if name not in self.ignored}
         base = self.run(**extra)
         assert base, f"{self.words}: the base run is refused"
-        return self.run(**{**extra, key: other(key, extra.get(key, value))}) not in (base, None)
+        values = SEVERAL.get(key, (other(key, extra.get(key, value)),))
+        return any(self.run(**{**extra, key: one}) not in (base, None) for one in values)
 
 
 def check(kind: Kind, only: str = "") -> None:

@@ -209,6 +209,7 @@ def test_gate_score_puts_success_first(small_run):
 
 
 def test_events_are_written_on_request(small_run, tmp_path):
+    pytest.importorskip("tensorboard", reason="pip install 'mtcsirl[tensorboard]'")
     train_agents([expert(small_run)], log=lambda line: None, events=tmp_path / "events")
     assert list((tmp_path / "events").glob("events.out.tfevents*"))
 

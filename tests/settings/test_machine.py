@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import pytest
+import torch
 
 from mtcsirl import cli
 from mtcsirl.errors import UserError
@@ -10,7 +11,6 @@ from mtcsirl.settings.loading import configured, load
 from mtcsirl.settings.machine import check_agent, check_irl, check_study
 from mtcsirl.settings.runs import baseline_run, irl_run
 
-torch = pytest.importorskip("torch")
 HUGE = "[1000000, 1000000]"
 
 

@@ -18,7 +18,7 @@ PACKAGES = ("metaworld", "mujoco", "gymnasium", "torch", "numpy", "stable-baseli
 
 @functools.cache
 def commit() -> str:
-    """Git commit of the code, "+" appended if the working tree differs, "unknown" outside a checkout."""
+    """Git commit of the code, "+" appended if the working tree differs; else "unknown: " and why."""
     folder = Path(__file__).resolve().parent
 
     def git(*words: str) -> str:
@@ -26,8 +26,12 @@ def commit() -> str:
 
     try:
         return git("rev-parse", "HEAD") + ("+" if git("status", "--porcelain", "--untracked-files=no") else "")
-    except (OSError, subprocess.CalledProcessError):
-        return "unknown"
+    except OSError:
+        return "unknown: git is not there"
+    except subprocess.CalledProcessError as error:
+        if "dubious ownership" in error.stderr:
+            return f"unknown: a checkout of another user; git config --global --add safe.directory {folder.parents[2]}"
+        return "unknown: no git checkout"
 
 
 def machine() -> dict[str, Any]:

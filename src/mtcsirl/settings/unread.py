@@ -13,7 +13,15 @@ from mtcsirl.errors import UserError
 
 Model = TypeVar("Model", bound=BaseModel)
 
-_OF_CS_REWARD = ("cs_weight", "curriculum", "warm_up_success", "warm_up_episodes", "warm_up_steps")
+_OF_CS_REWARD = (
+    "cs_weight",
+    "curriculum",
+    "curriculum_window",
+    "curriculum_maximum",
+    "warm_up_success",
+    "warm_up_episodes",
+    "warm_up_steps",
+)
 _OF_SELECTION = ("progress.select_every", "progress.select_episodes", "progress.select_training_episodes")
 _OF_EXPERT_GATE = ("gates.expert_velocity", "gates.expert_action_norm")
 _OF_AGENT = ("sac.updates_per_step", "progress.tensorboard")
