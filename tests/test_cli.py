@@ -163,7 +163,7 @@ def test_cost_of_an_agent_by_hand(rates: Rates) -> None:
         progress={"select_every": 1000, "select_episodes": 1},
         evaluation={"episodes": 1, "episode_steps": 500},
     )
-    steps, updates = 2000 + 2 * 500 + 2 * 500, (2000 - 1000) * 0.5
+    steps, updates = 2000 + 2 * 500 + 2 * (1 + 1) * 500, (2000 - 1000) * 0.5  # trained, tried, evaluated kept and last
     reach = cost(Expert("velocity", "reach", 0, 0), settings, rates)
     assert reach.seconds == pytest.approx(1.0 + steps * 0.002 + updates * 0.01)
     push = cost(Expert("velocity", "push-back", 0, 0), settings, rates)
@@ -197,6 +197,19 @@ def test_wall_time_is_bounded_by_work_and_by_the_longest_chain(rates: Rates) -> 
     assert wall_hours(stages, 1) == pytest.approx(total)
     assert wall_hours(stages, 2) == pytest.approx(total / 2)
     assert 0 < wall_hours(stages, 10_000) < total / 100
+
+
+@pytest.mark.parametrize(
+    "change", ["sac.critics=4", "sac.hidden_sizes=[512,512]", "irl.discriminator.hidden_sizes=[512,512]"]
+)
+def test_larger_networks_cost_more(rates: Rates, change: str) -> None:
+    stage = "learn_reward"
+    usual, larger = (
+        {one.stage: one.core_hours for one in plan(design(settings, "figure_2"), settings, rates)}
+        for settings in (load(), load(overrides=[change]))
+    )
+    assert larger[stage] > 1.05 * usual[stage]
+    assert (larger["transfer"] > 1.2 * usual["transfer"]) == change.startswith("sac.")
 
 
 def test_the_shipped_rates_are_measured() -> None:

@@ -105,7 +105,7 @@ def score(
                 {"transitions": name, "reward": function, **row}
                 for row in score_rows(functions[function], truth, chosen, settings, seed, function == "learned")
             ]
-        points.append(_points(name, chosen, functions, settings.discount))
+        points.append(_points(name, chosen, functions, settings))
     origin = (learned.experiment, learned.method, cs_reward, learned.source)
     key: dict[str, Any] = dict(zip(KEY, (*origin, task, target, seed), strict=True))
     write_csv(output / "scores.csv", pd.DataFrame(rows).assign(**key)[list(SCORE_COLUMNS)])
@@ -251,14 +251,18 @@ def _numbered(labels: Sequence[np.ndarray]) -> np.ndarray:
     return np.concatenate(numbers)
 
 
-def _points(name: str, chosen: TransitionSet, functions: dict[str, RewardFunction], discount: float) -> pd.DataFrame:
-    columns = nuisance(chosen.transitions, discount)
+def _points(
+    name: str, chosen: TransitionSet, functions: dict[str, RewardFunction], settings: ScoreRunSettings
+) -> pd.DataFrame:
+    """Evenly spaced transitions of a set; what is removed from the rests was fitted to the whole set."""
+    columns = nuisance(chosen.transitions, settings.discount)
     found = {which: _numpy(functions[which], chosen.transitions) for which in ("truth", "learned", "random")}
     found |= {f"{which}_rest": remove(found[which], columns) for which in ("truth", "learned")}
     found["task_reward"] = chosen.transitions.task_reward.double().numpy()
     values = {which: found[which].astype(np.float32) for which in POINT_VALUES}
     labels = {"agent": chosen.agent.astype(np.int32), "episode": chosen.episode.astype(np.int32)}
-    return pd.DataFrame({"transitions": name, **labels, **values})
+    spacing = -(-len(chosen.episode) // settings.score.points)
+    return pd.DataFrame({"transitions": name, **labels, **values}).iloc[::spacing]
 
 
 def _numpy(reward: RewardFunction, transitions: Transitions) -> Array:

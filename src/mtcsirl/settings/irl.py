@@ -172,4 +172,7 @@ class ScoreSettings(Frozen):
     """Transition sets on which a learned reward is held against the truth."""
 
     transitions: int = key(5_000, "transitions per set", unit="transitions", gt=1)
+    points: int = key(
+        1_000, "transitions per set that are kept for scatter plots and claims, evenly spaced", unit="transitions", gt=1
+    )
     bootstrap: int = key(500, "resamples of the cluster bootstrap by episode", unit="resamples", gt=0)

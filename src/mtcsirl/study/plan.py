@@ -8,19 +8,24 @@ against each other; the start page of a finished study gives the cost as measure
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import singledispatch
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 
 from mtcsirl.files.storage import read_json
-from mtcsirl.settings import EvaluationSettings, Settings
+from mtcsirl.settings import EvaluationSettings, SacSettings, Settings
 from mtcsirl.settings.base import Frozen
 from mtcsirl.settings.loading import validate
 from mtcsirl.settings.runs import AgentRunSettings, IrlRunSettings
-from mtcsirl.study.runs import AgentRun, AnyRun, Baseline, Demonstrations, Expert, IrlRun, Runs, Score, Transfer
+from mtcsirl.study.runs import AnyRun, Baseline, Demonstrations, Expert, IrlRun, Runs, Score, Transfer
 
 CALIBRATION = Path(__file__).with_name("calibration.json")
 BYTES_PER_TRANSITION = 4 * (39 + 4 + 39 + 1)
+MEASURED_HIDDEN = {"sac": (256, 256), "f": (128, 128)}
+"""Hidden layers of the networks whose updates were measured."""
+INPUTS = 82
+"""(s, a, s') of a learned reward."""
 SCORE_SETS = 5
 """Transition sets of score_reward that are rolled out."""
 
@@ -76,9 +81,17 @@ def cost(run: AnyRun, settings: Settings, rates: Rates) -> Cost:
 
 @cost.register(Expert)
 @cost.register(Baseline)
-@cost.register(Transfer)
-def _of_agent(run: AgentRun, settings: Settings, rates: Rates) -> Cost:
-    return _agent(run.settings(settings), run.task, rates)
+def _of_selected(run: Expert | Baseline, settings: Settings, rates: Rates) -> Cost:
+    """These try their policies, and evaluate the one that they keep beside the last."""
+    own = run.settings(settings)
+    tries = own.progress.select_episodes * (own.steps // own.progress.select_every)
+    return _agent(own, run.task, rates, tries * own.evaluation.episode_steps + 2 * _evaluation_steps(own.evaluation))
+
+
+@cost.register
+def _of_transfer(run: Transfer, settings: Settings, rates: Rates) -> Cost:
+    own = run.settings(settings)
+    return _agent(own, run.task, rates, _evaluation_steps(own.evaluation))
 
 
 @cost.register
@@ -101,11 +114,10 @@ def _of_score(run: Score, settings: Settings, rates: Rates) -> Cost:
     return Cost(seconds + score.bootstrap * rates.bootstrap, rates.base_memory_mib, 1.0)
 
 
-def _agent(own: AgentRunSettings, task: str, rates: Rates) -> Cost:
-    updates = (own.steps - own.sac.random_steps) * own.sac.updates_per_step
-    trials = own.steps // own.progress.select_every * own.progress.select_episodes * own.evaluation.episode_steps
-    steps = own.steps + trials + _evaluation_steps(own.evaluation)
-    seconds = steps * rates.step(task) + max(updates, 0) * rates.update(rates.sac_update, own.sac.minibatch)
+def _agent(own: AgentRunSettings, task: str, rates: Rates, tried: int) -> Cost:
+    """``tried``: environment steps beside training."""
+    updates = max((own.steps - own.sac.random_steps) * own.sac.updates_per_step, 0)
+    seconds = (own.steps + tried) * rates.step(task) + updates * _sac_update(own.sac, rates)
     memory = rates.base_memory_mib + own.steps * BYTES_PER_TRANSITION / 2**20
     return Cost(rates.start_up + seconds, memory, rates.agent_disk_mib)
 
@@ -113,9 +125,10 @@ def _agent(own: AgentRunSettings, task: str, rates: Rates) -> Cost:
 def _irl(own: IrlRunSettings, tasks: list[str], rates: Rates) -> Cost:
     irl = own.irl
     rounds = irl.warm_up_iterations + irl.iterations
-    alone = rates.update(rates.sac_update, own.sac.minibatch)
-    update = irl.generator_updates * alone * (rates.lockstep if len(tasks) > 1 else 1.0)
-    discriminate = irl.discriminator_updates * rates.update(rates.discriminator_update, irl.discriminator.minibatch)
+    update = irl.generator_updates * _sac_update(own.sac, rates) * (rates.lockstep if len(tasks) > 1 else 1.0)
+    step = rates.update(rates.discriminator_update, irl.discriminator.minibatch)
+    size = _weights(INPUTS, irl.discriminator.hidden_sizes, 1) / _weights(INPUTS, MEASURED_HIDDEN["f"], 1)
+    discriminate = irl.discriminator_updates * step * size
     seconds = rates.start_up + len(tasks) * (rounds * update + irl.iterations * discriminate)
     steps = rounds * irl.steps_per_iteration
     seconds += sum((steps + _evaluation_steps(own.evaluation)) * rates.step(task) for task in tasks)
@@ -126,8 +139,26 @@ def _irl(own: IrlRunSettings, tasks: list[str], rates: Rates) -> Cost:
 
 
 def _evaluation_steps(evaluation: EvaluationSettings) -> int:
-    """Stochastic and deterministic episodes."""
-    return 2 * evaluation.episodes * evaluation.episode_steps
+    """Stochastic episodes, and one deterministic one, which stands for all."""
+    return (evaluation.episodes + 1) * evaluation.episode_steps
+
+
+def _sac_update(sac: SacSettings, rates: Rates) -> float:
+    """Seconds of one gradient step: the measured ones were with ``MEASURED_HIDDEN`` and two critics.
+
+    With A and C weights of actor and critic an update multiplies 4 A + 6 n C of them per transition for n critics:
+    actor in s and s' and back (2 + 2); each critic at s' (1), at (s, a) and back (3), at pi's action and back (2).
+    """
+
+    def products(hidden: tuple[int, ...], critics: int) -> int:
+        return 4 * _weights(39, hidden, 8) + 6 * critics * _weights(43, hidden, 1)
+
+    size = products(sac.hidden_sizes, sac.critics) / products(MEASURED_HIDDEN["sac"], 2)
+    return rates.update(rates.sac_update, sac.minibatch) * size
+
+
+def _weights(inputs: int, hidden: tuple[int, ...], outputs: int) -> int:
+    return sum(first * second for first, second in pairwise((inputs, *hidden, outputs)))
 
 
 @dataclass(frozen=True)
