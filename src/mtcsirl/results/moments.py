@@ -97,7 +97,7 @@ def beyond_task(points: pd.DataFrame, generator: np.random.Generator, *, resampl
     spread of the K seeds, s^2 / K. The agents of ``SHARED`` are the same in all of them, which that spread cannot show:
     a bootstrap draws agents and within each its episodes, the shared agents alike in every seed, and the covariance of
     two seeds' draws is theirs. Quantiles are those of t with K - 1 degrees of freedom. Drawing seeds as well would
-    count the episodes twice, and its percentiles are too short at five seeds.
+    count the episodes twice.
 
     Args:
         points: rows (seed, transitions, agent, episode, truth, learned, task_reward) of one reward on one task.
