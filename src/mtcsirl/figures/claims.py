@@ -117,7 +117,7 @@ def _draw_units(axes: Axes, units: Sequence[Unit], colour: str) -> None:
     axes.set_xlim(low, high)
     axes.set_ylim(heights[-1] + 0.9, heights[0] - 0.9)  # the first unit on top
     measures = list(dict.fromkeys(unit.measure for unit in units))
-    axes.set_xlabel("\n".join(textwrap.wrap("; ".join(measures), 46)), labelpad=1, fontsize=6)
+    axes.set_xlabel("\n".join(textwrap.wrap("; ".join(measures), 44)), labelpad=1, fontsize=6)
     groups: dict[str, list[float]] = {}
     for height, unit in zip(heights, units, strict=True):
         groups.setdefault(_group(unit, len(measures) > 1), []).append(height)
