@@ -52,6 +52,17 @@ def register(verbs: Verbs) -> None:
     status.add_argument("--cores", type=positive, default=2, metavar="N", help="cores for the time left; default 2")
     add_study_settings(status)
 
+    target = add_verb(
+        verbs,
+        "target",
+        _target,
+        does="print what to ask snakemake for to make one run: snakemake --cores 1 $(mtcsirl target sac/reach-t0/s0)",
+        needs="nothing",
+        writes="nothing",
+    )
+    target.add_argument("folder", metavar="RUN", help="folder of the run below the results, as mtcsirl status names it")
+    add_study_settings(target)
+
     check = add_verb(
         verbs,
         "verify",
@@ -148,8 +159,21 @@ def _status(parsed: argparse.Namespace) -> None:
     print(f"\ntime left on {parsed.cores} cores: about {left / 3600:.1f} hours" if left else "\nall runs are done")
 
 
+def _target(parsed: argparse.Namespace) -> None:
+    from mtcsirl.files.identity import marker
+    from mtcsirl.study.keys import identity_of
+
+    settings = study_settings(parsed)
+    results = Path(settings.results)
+    folder = Path(parsed.folder)
+    name = (folder.relative_to(results) if folder.is_relative_to(results) else folder).as_posix()
+    runs = {run.folder: run for artefact in (None, *ABLATIONS) for run in design(settings, artefact)}
+    if name not in runs:
+        raise UserError(f"{parsed.folder}: is no run of the study at scale {settings.scale}; see mtcsirl status")
+    print(results / name / marker(identity_of(runs[name], settings).hash))
+
+
 def _verify(parsed: argparse.Namespace) -> None:
-    from mtcsirl.errors import UserError
     from mtcsirl.study.verification import faults
 
     found = list(faults(parsed.folder))
