@@ -1,5 +1,9 @@
 """Meta-World's environments, bit for bit, in less time."""
 
-from mtcsirl.worlds.fast.factory import FastEnvironment, make_fast_environment
+from mtcsirl.worlds.fast.scipy_later import import_meta_world
+
+import_meta_world()  # before any other module of this folder imports it
+
+from mtcsirl.worlds.fast.factory import FastEnvironment, make_fast_environment  # noqa: E402
 
 __all__ = ["FastEnvironment", "make_fast_environment"]
