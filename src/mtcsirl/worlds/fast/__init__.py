@@ -1,6 +1,6 @@
 """Meta-World's environments, bit for bit, in less time."""
 
-from mtcsirl.worlds.fast.scipy_later import import_meta_world
+from mtcsirl.worlds.fast.loading import import_meta_world
 
 import_meta_world()  # before any other module of this folder imports it
 
