@@ -24,6 +24,7 @@ from mtcsirl.study.design import ARTEFACTS, CLAIMS, design
 from mtcsirl.study.keys import FIELDS
 from mtcsirl.study.runs import Baseline, Demonstrations, Expert, IrlRun, Score, Transfer
 from mtcsirl.study.standing import settle
+from mtcsirl.worlds import drawable
 
 try:
     for file in workflow.configfiles if workflow.is_main_process else ():
@@ -44,11 +45,14 @@ RESULTS = SETTINGS.results
 os.environ["PATH"] = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
 
 os.environ[VARIABLE] = os.pathsep.join(SETTINGS.extensions)
+# whether scenes can be drawn is one answer for the whole workflow
+os.environ[drawable.VARIABLE] = drawable.lacking() or ""
 
 
 envvars:
     "PATH",
     VARIABLE,
+    drawable.VARIABLE,
 
 
 pathvars:
