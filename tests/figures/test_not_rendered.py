@@ -10,12 +10,10 @@ from mtcsirl.figures.style import caption_of
 from mtcsirl.settings.loading import load
 from mtcsirl.study.artefacts import artefact_identity
 from mtcsirl.study.standing import DONE, STALE
-from mtcsirl.worlds.drawable import lacking
-from tests.conftest import CHECKOUT
+from tests.conftest import CHECKOUT, needs_rendering
 from tests.hidden import environment
 
 SOURCE = CHECKOUT / "src"
-needs_rendering = pytest.mark.skipif(lacking() is not None, reason=str(lacking()))
 
 
 def drawn(folder: Path, *, osmesa: bool, **variables: str) -> subprocess.CompletedProcess[str]:
