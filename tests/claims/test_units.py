@@ -196,3 +196,11 @@ def test_the_mean_over_tasks_never_counts(lost):
     assert [unit.state for unit in found.units if unit.what == "all unseen tasks"] == ["not judged"] * 2
     assert found.reason.endswith("of 8 units")
     assert ("2 not run" in found.reason) == (lost == "push-back")
+
+
+def test_r_itself_is_called_r(findings):
+    """Beside a partial correlation; a speed is no r."""
+    texts = {f.name: unit_texts(f.units[0]) for f in findings}
+    assert texts["C9"]["ours"].startswith("r = 0.")
+    assert texts["C9"]["paper"] == "r = 0.86", "action norm"
+    assert not texts["C7"]["ours"].startswith("r = ")

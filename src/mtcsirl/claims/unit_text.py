@@ -32,7 +32,7 @@ def unit_texts(unit: Unit) -> dict[str, str]:
     return {
         "unit": f"{unit.cs_reward.replace('_', ' ')}, {unit.what}",
         "judged": f"{unit.state}: {unit.outcome}" if unit.outcome else unit.state,
-        "paper": "no number" if np.isnan(unit.paper.mean) else _spread(unit.paper),
+        "paper": "no number" if np.isnan(unit.paper.mean) else _r(unit) + _spread(unit.paper),
         "ours": _ours(unit),
         "measure": _measure(unit),
         "ours_in_prediction": _prediction(unit),
@@ -48,7 +48,12 @@ def _ours(unit: Unit) -> str:
     if unit.ours.n == 0:
         return DASH
     success = "" if np.isnan(unit.success.mean) else f", success {100 * unit.success.mean:.0f} %"
-    return f"{_spread(unit.ours)}, n={unit.ours.n}{success}"
+    return f"{_r(unit)}{_spread(unit.ours)}, n={unit.ours.n}{success}"
+
+
+def _r(unit: Unit) -> str:
+    """Ours and the paper's number are r itself where the criterion looks at the partial correlation."""
+    return "r = " if unit.measure == PARTIAL else ""
 
 
 def _measure(unit: Unit) -> str:
