@@ -22,9 +22,11 @@ $(VENV)/.ready: pyproject.toml constraints.txt
 	touch $@
 
 replicate: setup  ## the whole paper at desk scale: every table, figure, verdict and the report
+	mtcsirl doctor --cores $(CORES)
 	snakemake --cores $(CORES)
 
 smoke: setup  ## the same in minutes, too small to mean anything
+	mtcsirl doctor --cores $(CORES) --scale smoke
 	snakemake --cores $(CORES) $(SMOKE)
 
 quick: setup  ## what one runs before each commit, under two minutes on two idle cores: lint, fast tests

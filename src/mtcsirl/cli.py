@@ -15,7 +15,7 @@ from collections.abc import Sequence
 from typing import NoReturn
 
 from mtcsirl import __version__
-from mtcsirl.commands import artefacts, diagnostics, export, stages, study, together, validate, video
+from mtcsirl.commands import archive, artefacts, diagnostics, doctor, export, stages, study, together, validate, video
 from mtcsirl.errors import UserError
 from mtcsirl.extensions import load_from_environment
 from mtcsirl.files import console, stop
@@ -55,7 +55,7 @@ def parser() -> Parser:
     )
     root.add_argument("--version", action="version", version=__version__)
     verbs = root.add_subparsers(metavar="VERB", required=True)
-    for group in (stages, together, artefacts, diagnostics, study, video, export, validate):
+    for group in (stages, together, artefacts, diagnostics, study, archive, doctor, video, export, validate):
         group.register(verbs)
     return root
 

@@ -40,7 +40,7 @@ def unit_texts(unit: Unit) -> dict[str, str]:
         "difference": _difference(unit),
         "effect": _effect(unit),
         "why": unit.reason,
-        "notes": "; ".join([*_power(unit), *unit.notes]) or DASH,
+        "notes": "; ".join(filter(None, [power_text(unit.power), *unit.notes])) or DASH,
     }
 
 
@@ -67,10 +67,9 @@ def _prediction(unit: Unit) -> str:
     return f"{text}, uninformative: spreads {unit.paper.std:.2g} and {unit.ours.std:.2g} (F = {unit.spreads.ratio:.3g})"
 
 
-def _power(unit: Unit) -> list[str]:
-    if np.isnan(unit.power):
-        return []
-    return [f"power {100 * unit.power:.0f} % at these spreads and seeds, were both equal"]
+def power_text(power: float) -> str:
+    """Of a test of equivalence; empty where there is none."""
+    return "" if np.isnan(power) else f"power {100 * power:.0f} % at these spreads and seeds, were both equal"
 
 
 def _difference(unit: Unit) -> str:
@@ -102,7 +101,7 @@ def _spread(summary: Summary) -> str:
 
 
 def _estimate(estimate: Estimate, digits: int = 2) -> str:
-    return f"{estimate.value:.{digits}f}{_bounds(Interval(estimate.low, estimate.high), digits)}"
+    return f"{_number(estimate.value, digits)}{_bounds(Interval(estimate.low, estimate.high), digits)}"
 
 
 def _bounds(interval: Interval, digits: int = 2) -> str:
@@ -110,4 +109,9 @@ def _bounds(interval: Interval, digits: int = 2) -> str:
         return ""
     if np.isinf([interval.low, interval.high]).any():
         return " [no finite bounds: SAC's gap is not surely there]"
-    return f" [{interval.low:.{digits}f}, {interval.high:.{digits}f}]"
+    return f" [{_number(interval.low, digits)}, {_number(interval.high, digits)}]"
+
+
+def _number(value: float, digits: int) -> str:
+    """What rounds to zero has no sign."""
+    return f"{round(value, digits) + 0.0:.{digits}f}"

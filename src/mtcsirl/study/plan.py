@@ -18,7 +18,7 @@ from mtcsirl.settings import EvaluationSettings, SacSettings, Settings
 from mtcsirl.settings.base import Frozen
 from mtcsirl.settings.loading import validate
 from mtcsirl.settings.runs import AgentRunSettings, IrlRunSettings
-from mtcsirl.study.runs import AnyRun, Baseline, Demonstrations, Expert, IrlRun, Runs, Score, Transfer
+from mtcsirl.study.runs import AnyRun, Baseline, Demonstrations, Expert, IrlRun, Score, Transfer
 
 CALIBRATION = Path(__file__).with_name("calibration.json")
 BYTES_PER_TRANSITION = 4 * (39 + 4 + 39 + 1)
@@ -173,8 +173,8 @@ class StagePlan:
     disk_gib: float
 
 
-def plan(study: Runs, settings: Settings, rates: Rates) -> list[StagePlan]:
-    """One line per stage, in the DAG's order; core-hours are of cores that are all busy."""
+def plan(study: Iterable[AnyRun], settings: Settings, rates: Rates) -> list[StagePlan]:
+    """One line per stage of the runs, in the DAG's order; core-hours are of cores that are all busy."""
     costs: dict[str, list[Cost]] = {}
     for run in study:
         costs.setdefault(run.stage, []).append(cost(run, settings, rates))
