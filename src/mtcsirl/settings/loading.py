@@ -16,17 +16,18 @@ from mtcsirl.settings.strict import StrictError, parse
 Model = TypeVar("Model", bound=BaseModel)
 CONFIG = Path(__file__).resolve().parents[3] / "config"
 """The configuration of the checkout, whatever the working directory: the one that the Snakefile reads too."""
+SHIPPED = Path(__file__).resolve().parents[1] / "config"
+"""The same in an installed package, which has no checkout around it; in the checkout a link."""
 
 
 def load(files: Iterable[Path | str] = (), overrides: Iterable[str] = (), scale: str | None = None) -> Settings:
     """Settings from ``config/config.yaml``, the overlay of ``scale``, further ``files``, then ``key=value`` overrides.
 
     Later ones win; mappings merge and lists are replaced, as with ``snakemake --configfile``. Without a
-    ``config.yaml`` (an installed package) the defaults of the classes stand in for it: they are the same.
+    ``config.yaml`` in the checkout (an installed package) the one that the package brings stands in for it.
     """
-    named = [CONFIG / "config.yaml"] if (CONFIG / "config.yaml").is_file() else []
-    if scale not in (None, "desk"):
-        named.append(CONFIG / f"{scale}.yaml")
+    folder = CONFIG if (CONFIG / "config.yaml").is_file() else SHIPPED
+    named = [folder / "config.yaml"] if scale in (None, "desk") else [folder / "config.yaml", folder / f"{scale}.yaml"]
     data: dict[str, Any] = {}
     for path in [*named, *files]:
         data = merge(data, read_yaml(path))
