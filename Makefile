@@ -8,7 +8,7 @@ SMOKE := --configfile config/smoke.yaml
 # the tools find each other, and every job finds `mtcsirl`, without an activated environment
 export PATH := $(CURDIR)/$(BIN):$(PATH)
 
-.PHONY: help setup replicate smoke reference quick test lint bench audit constraints
+.PHONY: help setup replicate smoke quick test lint bench audit constraints
 
 help:  ## print this list
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
@@ -34,6 +34,7 @@ STUDY :=
 WITHIN = $(STUDY) --set results=$(REFERENCE)/results/reference --set figures=$(REFERENCE)/paper_figs
 SHOWN := claims $(addprefix figure-,2 3 4 5 6 7 s1 s2 1 8 9) $(addprefix table-,1 2 3 4 5)
 
+.PHONY: reference
 reference: setup  ## from the committed archive, without training: every table, figure, verdict and the report, as committed
 	rm -rf $(REFERENCE)
 	mtcsirl archive unpack --archive $(ARCHIVE) $(WITHIN)
