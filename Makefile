@@ -29,6 +29,22 @@ smoke: setup  ## the same in minutes, too small to mean anything
 	mtcsirl doctor --cores $(CORES) --scale smoke
 	snakemake --cores $(CORES) $(SMOKE)
 
+# `reference` builds a mirror of the checkout below REFERENCE, so that links between pages stay the same
+ARCHIVE := results/reference
+REFERENCE := build/reference
+STUDY :=
+WITHIN = $(STUDY) --set results=$(REFERENCE)/results/reference --set figures=$(REFERENCE)/paper_figs
+SHOWN := claims $(addprefix figure-,2 3 4 5 6 7 s1 s2 1 8 9) $(addprefix table-,1 2 3 4 5)
+
+.PHONY: reference
+reference: setup  ## from the committed archive, without training: every table, figure, verdict and the report, as committed
+	rm -rf $(REFERENCE)
+	mtcsirl archive unpack --archive $(ARCHIVE) $(WITHIN)
+	printf '%s\n' $(SHOWN) | tr - ' ' | xargs -P $(CORES) -I '{}' sh -c 'mtcsirl {} --partial $(WITHIN) > /dev/null'
+	mtcsirl report --partial $(WITHIN)
+	git ls-files results/reference paper_figs | grep -v -e '/part-' -e 'README.md$$' \
+	| while read -r file; do cmp "$$file" "$(REFERENCE)/$$file" || exit 1; done
+
 quick: setup  ## what one runs before each commit, under two minutes on two idle cores: lint, fast tests
 	ruff check
 	ruff format --check

@@ -2,6 +2,8 @@
 
 import json
 import shutil
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -28,6 +30,7 @@ from mtcsirl.study.runs import AnyRun, Demonstrations, IrlRun, Score
 from mtcsirl.study.standing import DONE, INCOMPLETE, settle, standing
 from mtcsirl.study.status import study_status
 from mtcsirl.study.verification import faults
+from tests.conftest import CHECKOUT
 from tests.results.made_up import sign, write_demonstrations, write_run
 
 SEVERAL = {
@@ -370,7 +373,7 @@ def test_a_file_of_an_unknown_kind_is_not_added(made, tmp_path):
     storage.remove(results / IRL.folder / FILE)
     storage.write_text(results / IRL.folder / "own.txt", "x")
     sign(IRL, settings(results))
-    with pytest.raises(UserError, match="own.txt: no kind of file that the archive knows"):
+    with pytest.raises(UserError, match=r"own\.txt: no kind of file that the archive knows"):
         add(tmp_path / "archive", results)
 
 
@@ -468,10 +471,22 @@ def test_an_archive_that_is_not_there_is_one_line(tmp_path, capsys):
         assert capsys.readouterr().err == f"mtcsirl: {tmp_path / 'none'}: no archive there; `archive add` begins one\n"
 
 
+def test_the_example_reads_it_without_the_package(whole):
+    script = CHECKOUT / "examples" / "read_archive.py"
+    text = script.read_text(encoding="utf-8")
+    assert "mtcsirl" not in text
+    assert len(text.splitlines()) < 40
+    done = subprocess.run([sys.executable, str(script), str(whole)], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert f"{len(STUDY.irl_runs)} learned rewards; the first has" in done.stdout
+    assert f"[{len(STUDY.transfers)} rows x 2 columns]" in done.stdout or STUDY.transfers[0].folder[:20] in done.stdout
+
+
 def test_the_made_up_study_has_every_kind_of_file(made):
     """Else the tests above would pass for files that they never saw."""
     for run in STUDY:
         found = set(result_files(made / run.folder)) | {"provenance.json"}
         assert set(OUTPUTS[run.stage]) <= found, run.folder
         assert read_record(made / run.folder) is not None
-    assert SCORE.experts and SCORE.baselines
+    assert SCORE.experts
+    assert SCORE.baselines
