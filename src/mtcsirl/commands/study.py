@@ -6,6 +6,7 @@ import shutil
 import sys
 import time
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -20,6 +21,7 @@ from mtcsirl.commands.arguments import (
     study_settings,
 )
 from mtcsirl.errors import UserError
+from mtcsirl.files.stop import Stopped
 from mtcsirl.study.ablations import ABLATIONS
 from mtcsirl.study.design import ARTEFACTS, design
 
@@ -142,17 +144,25 @@ def _print_artefacts(settings: "Settings", rates: "Rates") -> None:
 
 
 def _status(parsed: argparse.Namespace) -> None:
-    from mtcsirl.study.screen import short
     from mtcsirl.study.status import study_status
 
     settings = study_settings(parsed)
+    if parsed.watch is not None:
+        with suppress(Stopped):  # the usual end of watching
+            _watch(parsed, settings)
+        return
+    statuses = study_status(design(settings, parsed.target), settings)
+    print("\n".join([*_status_lines(statuses), "", _left(statuses, settings, parsed.cores)]))
+
+
+def _watch(parsed: argparse.Namespace, settings: "Settings") -> None:
+    from mtcsirl.study.screen import short
+    from mtcsirl.study.status import study_status
+
     study, before = design(settings, parsed.target), ""
     while True:
         statuses = study_status(study, settings)
         left = _left(statuses, settings, parsed.cores)
-        if parsed.watch is None:
-            print("\n".join([*_status_lines(statuses), "", left]))
-            return
         if sys.stdout.isatty():
             columns, rows = shutil.get_terminal_size()
             shown = [time.strftime("%H:%M:%S ") + left, *_status_lines(statuses)][: rows - 1]
@@ -167,10 +177,11 @@ def _status(parsed: argparse.Namespace) -> None:
 
 def _left(statuses: "list[RunStatus]", settings: "Settings", cores: int) -> str:
     from mtcsirl.study.plan import load_rates
+    from mtcsirl.study.screen import duration
     from mtcsirl.study.status import seconds_left
 
     left = seconds_left(statuses, settings, load_rates(), cores)
-    return f"time left on {cores} cores: about {left / 3600:.1f} hours" if left else ALL_DONE
+    return f"time left on {cores} cores: about {duration(left)}" if left else ALL_DONE
 
 
 def _counts(statuses: "list[RunStatus]") -> str:
