@@ -28,3 +28,17 @@ def test_several_targets_may_be_one_where_the_study_says_so(demonstrations, tmp_
     words += ["--demonstrations", str(demonstrations[0]), "--output", str(tmp_path / "run")]
     assert main(["learn-reward", *words, *(["--experiment", asked] if asked else [])]) == 0
     assert read_record(tmp_path / "run").identity.key["experiment"] == key
+
+
+def test_workers_change_no_byte(demonstrations, tmp_path):
+    files = [str(file) for file in demonstrations]
+    given = ["--method", "mt_csirl", "--cs-reward", "velocity", "--seed", "7", "--scale", "smoke"]
+    given += ["--set", "irl.iterations=1", "--demonstrations", *files]
+    for workers in ("0", "2"):
+        assert main(["learn-reward", *given, "--workers", workers, "--output", str(tmp_path / workers)]) == 0
+    left = sorted(file.name for file in (tmp_path / "0").iterdir() if file.name != "provenance.json")
+    assert "reward.safetensors" in left
+    assert "identity.json" in left
+    for name in left:
+        if (tmp_path / "0" / name).is_file():
+            assert (tmp_path / "0" / name).read_bytes() == (tmp_path / "2" / name).read_bytes(), name
