@@ -1,4 +1,4 @@
-# Everything into .venv, from nothing but Python and git.
+# Everything into .venv, from nothing but Python, Git and Make.
 PYTHON ?= python3
 CORES ?= 2
 VENV := .venv

@@ -45,7 +45,7 @@ def test_a_bare_machine_is_told_the_remedy_and_may_go_on(tmp_path: Path) -> None
     assert list(states(done)) == LOOKED_AT
     assert states(done)["rendering"] == LACKS
     assert "apt-get install libosmesa6" in done.stdout
-    assert max(map(len, done.stdout.splitlines())) <= 280
+    assert max(map(len, done.stdout.splitlines())) <= 200
 
 
 def test_what_makes_a_study_impossible_ends_it(tmp_path: Path) -> None:

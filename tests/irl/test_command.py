@@ -1,6 +1,9 @@
 """`mtcsirl learn-reward` on files of one's own: settings are those of the tasks demonstrated, not of all tasks."""
 
+import pytest
+
 from mtcsirl.cli import main
+from mtcsirl.files.identity import read_record
 from mtcsirl.files.storage import read_json
 from tests.irl.conftest import MEMBERS
 
@@ -17,6 +20,14 @@ def test_a_run_has_the_settings_of_its_own_tasks(demonstrations, tmp_path):
     settings = read_json(output / "settings.json")
     assert settings["irl"]["warm_up_iterations"] == 1
     assert "push-back" not in settings["scripted_steps"]
+
+
+@pytest.mark.parametrize(("asked", "key"), [("multi_target", "multi_target"), (None, "single_target")])
+def test_several_targets_may_be_one_where_the_study_says_so(demonstrations, tmp_path, asked, key):
+    words = ["--method", "mt_csirl", "--cs-reward", "velocity", "--seed", "100", "--scale", "smoke"]
+    words += ["--demonstrations", str(demonstrations[0]), "--output", str(tmp_path / "run")]
+    assert main(["learn-reward", *words, *(["--experiment", asked] if asked else [])]) == 0
+    assert read_record(tmp_path / "run").identity.key["experiment"] == key
 
 
 def test_workers_change_no_byte(demonstrations, tmp_path):

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from mtcsirl.study import screen
-from mtcsirl.study.screen import EXPECTED, WIDEST, Screen, duration, last_lines, short, wrapped
+from mtcsirl.study.screen import EXPECTED, WIDEST, Screen, duration, last_lines, last_said, short, wrapped
 
 
 class Clock:
@@ -101,3 +101,6 @@ def test_durations_and_logs(tmp_path: Path) -> None:
     assert last_lines(tmp_path / "none", 3) == []
     (tmp_path / "log").write_bytes(b"\xff\n" * 5000 + b"last\n\n")
     assert last_lines(tmp_path / "log", 1) == ["last"]
+    assert last_said(tmp_path / "log") == "last"
+    (tmp_path / "log").write_text("--- 2026-01-01 12:00:00 pid 1: mtcsirl train-sac\n")
+    assert last_said(tmp_path / "log") == "", "it only began"

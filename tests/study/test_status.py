@@ -1,9 +1,12 @@
 """How far a study is: once, watched, and in one line before a workflow starts."""
 
 import os
+import pty
+import signal
 import subprocess
 import sys
 import time
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
@@ -74,3 +77,24 @@ def test_a_watched_study_is_a_line_per_change_in_a_file_and_ends_with_it(setting
     assert watched.returncode == 0, error
     assert rest.count("\n") == 1, "nothing is said twice"
     assert rest.endswith("0 waiting; all runs are done\n")
+
+
+def test_on_a_terminal_the_screen_is_cleared_and_ctrl_c_ends_it(settings: Settings) -> None:
+    main, side = pty.openpty()
+    command = [sys.executable, "-m", "mtcsirl.cli", "status", "--watch", "1", "--settings", settings.model_dump_json()]
+    env = os.environ | {"PYTHONPATH": str(CHECKOUT / "src"), "COLUMNS": "60", "LINES": "20"}
+    watched = subprocess.Popen(command, env=env, stdin=side, stdout=side, stderr=side)
+    os.close(side)
+    read = b""
+    while read.count(b"\x1b[2J") < 2:
+        read += os.read(main, 4096)
+    watched.send_signal(signal.SIGINT)
+    with suppress(OSError):  # Linux's way to say that nobody holds the other end
+        while more := os.read(main, 4096):
+            read += more
+    os.close(main)
+    assert watched.wait(timeout=60) == 0
+    screen = read.decode().split("\x1b[2J")[1].splitlines()
+    assert len(screen) < 20
+    assert max(map(len, screen)) < 70
+    assert any(line.startswith("train_expert") for line in screen)

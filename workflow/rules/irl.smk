@@ -23,7 +23,8 @@ rule learn_reward:
         folder=subpath(output[0], parent=True),
     shell:
         "mtcsirl learn-reward --method {wildcards.method:q} --cs-reward {wildcards.cs_reward:q}"
-        " --seed {wildcards.seed:q} --demonstrations {params.demonstrations:q}"
+        " --seed {wildcards.seed:q} --experiment {wildcards.experiment:q}"
+        " --demonstrations {params.demonstrations:q}"
         " --settings {params.settings:q} --output {params.folder:q} --identity {wildcards.identity:q} >> {log:q} 2>&1"
 
 

@@ -25,11 +25,12 @@ def register(verbs: Verbs) -> None:
 def _doctor(parsed: argparse.Namespace) -> None:
     from mtcsirl.study.plan import load_rates
     from mtcsirl.study.readiness import FAILS, findings
+    from mtcsirl.study.screen import wrapped
 
     settings = study_settings(parsed)
     failed = []
     for found in findings(design(settings), settings, load_rates(), parsed.cores):
-        print(f"{found.what:<10} {found.state:<6} {found.says}")
+        print("\n".join(wrapped(f"{found.what:<10} {found.state:<6} {found.says}")))
         if found.state == FAILS:
             failed.append(found.what)
     if failed:

@@ -124,6 +124,8 @@ def _learn_reward(verbs: Verbs) -> None:
 
         members = [member_of(file) for file in parsed.demonstrations]
         experiment, source = experiment_of(members)
+        if (parsed.experiment, experiment) == ("multi_target", "single_target"):
+            experiment = "multi_target"  # of one target, as at smoke scale
         check_experiment(parsed.experiment, experiment, members)
         tasks = {task for task, _ in members}
         of_members = partial(irl_run, experiment=experiment, tasks=tasks, method=parsed.method)

@@ -2,13 +2,11 @@
 
 import argparse
 import json
-import shutil
-import sys
-import time
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from mtcsirl.commands import status
 from mtcsirl.commands.arguments import (
     Verbs,
     add_artefact,
@@ -19,6 +17,7 @@ from mtcsirl.commands.arguments import (
     positive,
     study_settings,
 )
+from mtcsirl.commands.status import aligned
 from mtcsirl.errors import UserError
 from mtcsirl.study.ablations import ABLATIONS
 from mtcsirl.study.design import ARTEFACTS, design
@@ -26,9 +25,6 @@ from mtcsirl.study.design import ARTEFACTS, design
 if TYPE_CHECKING:
     from mtcsirl.settings import Settings
     from mtcsirl.study.plan import Rates
-    from mtcsirl.study.status import RunStatus
-
-ALL_DONE = "all runs are done"
 
 
 def register(verbs: Verbs) -> None:
@@ -46,25 +42,7 @@ def register(verbs: Verbs) -> None:
     plan.add_argument("--cores", type=positive, default=2, metavar="N", help="cores to spread the jobs over; default 2")
     add_study_settings(plan)
 
-    status = add_verb(
-        verbs,
-        "status",
-        _status,
-        does="print how far a study is: done, running, failed, gates passed, time left",
-        needs="the study's results folder, finished or not",
-        writes="nothing",
-    )
-    add_artefact(status)
-    status.add_argument("--cores", type=positive, default=2, metavar="N", help="cores for the time left; default 2")
-    status.add_argument(
-        "--watch",
-        type=positive,
-        nargs="?",
-        const=5,
-        metavar="SECONDS",
-        help="again every SECONDS (default 5) until all is done: one screen on a terminal, a line per change in a file",
-    )
-    add_study_settings(status)
+    status.register(verbs)
 
     target = add_verb(
         verbs,
@@ -152,64 +130,6 @@ def _print_artefacts(settings: "Settings", rates: "Rates") -> None:
     _print_table(("artefact", "jobs", "core-hours"), lines)
 
 
-def _status(parsed: argparse.Namespace) -> None:
-    from mtcsirl.study.screen import short
-    from mtcsirl.study.status import study_status
-
-    settings = study_settings(parsed)
-    study, before = design(settings, parsed.target), ""
-    while True:
-        statuses = study_status(study, settings)
-        left = _left(statuses, settings, parsed.cores)
-        if parsed.watch is None:
-            print("\n".join([*_status_lines(statuses), "", left]))
-            return
-        if sys.stdout.isatty():
-            columns, rows = shutil.get_terminal_size()
-            shown = [time.strftime("%H:%M:%S ") + left, *_status_lines(statuses)][: rows - 1]
-            print("\x1b[H\x1b[2J" + "\n".join(short(line, max(columns - 1, 20)) for line in shown), flush=True)
-        elif (counts := _counts(statuses)) != before:
-            print(f"{time.strftime('%H:%M:%S')} {counts}; {left}", flush=True)
-            before = counts
-        if left == ALL_DONE:
-            return
-        time.sleep(parsed.watch)
-
-
-def _left(statuses: "list[RunStatus]", settings: "Settings", cores: int) -> str:
-    from mtcsirl.study.plan import load_rates
-    from mtcsirl.study.status import seconds_left
-
-    left = seconds_left(statuses, settings, load_rates(), cores)
-    return f"time left on {cores} cores: about {left / 3600:.1f} hours" if left else ALL_DONE
-
-
-def _counts(statuses: "list[RunStatus]") -> str:
-    from mtcsirl.study.status import STATES
-
-    states = [status.state for status in statuses]
-    return f"of {len(states)} runs " + ", ".join(f"{states.count(state)} {state}" for state in STATES)
-
-
-def _status_lines(statuses: "list[RunStatus]") -> list[str]:
-    """Stages with their counts, then what runs, failed or is stale, each with what it says."""
-    from mtcsirl.study.status import FAILED, RUNNING, STALE, STATES
-
-    lines = []
-    for stage in dict.fromkeys(status.run.stage for status in statuses):
-        own = [status for status in statuses if status.run.stage == stage]
-        gates = [status.passed for status in own if status.passed is not None]
-        counts = [sum(status.state == state for status in own) for state in STATES]
-        lines.append((stage, *counts, f"{sum(gates)} of {len(gates)}" if gates else ""))
-    said = [
-        f"{state}: {status.run.folder}: {status.says}"
-        for state in (RUNNING, FAILED, STALE)
-        for status in statuses
-        if status.state == state
-    ]
-    return [*_table(("stage", *STATES, "gates passed"), lines), *said]
-
-
 def _target(parsed: argparse.Namespace) -> None:
     from mtcsirl.files.identity import marker
     from mtcsirl.study.keys import identity_of
@@ -236,18 +156,7 @@ def _verify(parsed: argparse.Namespace) -> None:
 
 
 def _print_table(head: tuple[str, ...], rows: Sequence[tuple[object, ...]]) -> None:
-    print("\n".join(_table(head, rows)))
-
-
-def _table(head: tuple[str, ...], rows: Sequence[tuple[object, ...]]) -> list[str]:
-    """Columns aligned: the first to the left, numbers to the right."""
-    texts = [tuple(map(str, row)) for row in (head, *rows)]
-    widths = [max(len(row[i]) for row in texts) for i in range(len(head))]
-    lines = []
-    for row in texts:
-        rest = [text.rjust(width) for text, width in zip(row[1:], widths[1:], strict=True)]
-        lines.append("  ".join((row[0].ljust(widths[0]), *rest)).rstrip())
-    return lines
+    print("\n".join(aligned(head, rows)))
 
 
 def _deviations(parsed: argparse.Namespace) -> None:

@@ -85,7 +85,7 @@ class Screen:
         failed = f", {len(self.failed)} failed" if self.failed else ""
         lines = [f"{self._count()} done{failed}{self._left()}", *textwrap.wrap(stages, max(width - 1, 20))]
         for job in self.running.values():
-            at = next(iter(last_lines(job.log, 1)), "") if job.log else ""
+            at = last_said(job.log) if job.log else ""
             lines.append(f"  {duration(self._clock() - job.since):>8} {job.rule} {job.makes}: {at}")
         return [short(line, max(width - 1, 20)) for line in lines]
 
@@ -140,3 +140,9 @@ def last_lines(log: Path, count: int) -> list[str]:
     except OSError:
         return []
     return [line.strip() for line in text.replace("\r", "\n").split("\n") if line.strip()][-count:]
+
+
+def last_said(log: Path) -> str:
+    """The last line of a log; nothing while it holds only the line that says when the job began."""
+    line = next(iter(last_lines(log, 1)), "")
+    return "" if line.startswith("--- ") else line

@@ -12,7 +12,7 @@ from mtcsirl.study.keys import identity_of
 from mtcsirl.study.outputs import OUTPUTS
 from mtcsirl.study.plan import Rates, cost
 from mtcsirl.study.runs import AnyRun, Runs
-from mtcsirl.study.screen import last_lines, short
+from mtcsirl.study.screen import last_said, short
 from mtcsirl.study.standing import DONE, INCOMPLETE, STALE, standing
 
 RUNNING, FAILED, WAITING = "running", "failed", "waiting"
@@ -46,7 +46,7 @@ def run_status(run: AnyRun, settings: Settings) -> RunStatus:
     results = Path(settings.results)
     log = results / "logs" / run.folder / f"{identity_of(run, settings).hash}.log"
     if storage.is_locked(results / run.folder):
-        return RunStatus(run, RUNNING, says=_last_line(log))
+        return RunStatus(run, RUNNING, says=last_said(log))
     found = standing(run, settings)
     if found.state == DONE:
         return _finished(run, results / run.folder)
@@ -54,7 +54,7 @@ def run_status(run: AnyRun, settings: Settings) -> RunStatus:
         return RunStatus(run, FAILED, says="; ".join(found.why))
     if log.is_file():
         starting = time.time() - log.stat().st_mtime < STARTING_SECONDS
-        return RunStatus(run, RUNNING if starting else FAILED, says=_last_line(log))
+        return RunStatus(run, RUNNING if starting else FAILED, says=last_said(log))
     return RunStatus(run, STALE if found.state == STALE else WAITING, says="; ".join(found.why))
 
 
@@ -92,7 +92,3 @@ def _finished(run: AnyRun, folder: Path) -> RunStatus:
         return RunStatus(run, DONE, gate.get("passed"), seconds)
     except (UserError, KeyError, TypeError, ValueError, AttributeError) as error:
         return RunStatus(run, FAILED, says=str(error))
-
-
-def _last_line(log: Path) -> str:
-    return next(iter(last_lines(log, 1)), "")

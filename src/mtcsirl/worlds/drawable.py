@@ -7,9 +7,9 @@ import sys
 from functools import cache
 
 from mtcsirl.errors import UserError
-from mtcsirl.worlds.rendering import MISSING_OSMESA
 from mtcsirl.worlds.variables import backend, check_platform
 
+NO_OSMESA = "OSMesa is missing: apt-get install libosmesa6 (Debian), or set MUJOCO_GL=egl on a machine with a GPU"
 VARIABLE = "MTCSIRL_NOT_RENDERED"
 """Hands the answer of a workflow to its jobs, which may run elsewhere; empty: scenes are drawn."""
 _TRY = (
@@ -33,7 +33,7 @@ def _lacking() -> str | None:
     except UserError as error:
         return str(error)
     if drawn_by == "osmesa":
-        return None if _osmesa() else MISSING_OSMESA
+        return None if _osmesa() else NO_OSMESA
     # a driver may end its process, so it is tried in another one
     done = subprocess.run([sys.executable, "-c", _TRY], capture_output=True, text=True, check=False)
     if done.returncode:
