@@ -179,14 +179,20 @@ def _data_file(node: ast.Call) -> Iterator[str]:
 def examine(definition: Definition) -> tuple[str, frozenset[Definition], frozenset[str]]:
     """The hash of a definition, the definitions that it refers to and the data files that it reads."""
     module = load(definition.module)
-    node = ast.parse(ast.unparse(module.definitions[definition.name])).body[0]
-    canonical = _Canonical(module)
+    digest, found, data = _examined(definition.module, module.definitions[definition.name])
+    return digest, found - {definition}, data
+
+
+@cache
+def _examined(module: str, node: ast.stmt) -> tuple[str, frozenset[Definition], frozenset[str]]:
+    """As `examine`; rewrites the tree, which several names may share, for good."""
+    canonical = _Canonical(load(module))
     tree = canonical.visit(node)
     for part in ast.walk(tree):
         if isinstance(part, _Scope | ast.With | ast.If | ast.For | ast.While | ast.Try) and not part.body:
             part.body = [ast.Pass()]
     digest = hashlib.sha256(ast.dump(tree).encode()).hexdigest()[:12]
-    return digest, frozenset(canonical.found - {definition}), frozenset(canonical.data)
+    return digest, frozenset(canonical.found), frozenset(canonical.data)
 
 
 def file_hash(path: Path) -> str:
