@@ -21,7 +21,7 @@ IN_A_FRAME = 3.6
 """Times that a transition's numbers are held while a frame of them is made and written, as objects and as columns."""
 RECORDED, READ = 6.0, 2.0
 """Times that demonstrations are held while they are recorded, and once they are read."""
-SCORING, SCORED = 190.0, 4.5
+SCORING, SCORED = 220.0, 3.6
 """What a score takes beside the generators' samples, and times that these are held."""
 SAMPLED_ROLLOUTS = 10
 """Last rollouts of a generator that an IRL run leaves, and that a score reads."""
