@@ -8,10 +8,10 @@ SMOKE := --configfile config/smoke.yaml
 # the tools find each other, and every job finds `mtcsirl`, without an activated environment
 export PATH := $(CURDIR)/$(BIN):$(PATH)
 
-.PHONY: help setup replicate smoke quick test lint bench audit constraints
+.PHONY: help setup replicate smoke quick test lint bench bench-node audit constraints
 
 help:  ## print this list
-	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
+	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
 
 setup: $(VENV)/.ready  ## the virtual environment with the exact versions of constraints.txt
 
@@ -22,9 +22,11 @@ $(VENV)/.ready: pyproject.toml constraints.txt
 	touch $@
 
 replicate: setup  ## the whole paper at desk scale: every table, figure, verdict and the report
+	mtcsirl doctor --cores $(CORES)
 	snakemake --cores $(CORES)
 
 smoke: setup  ## the same in minutes, too small to mean anything
+	mtcsirl doctor --cores $(CORES) --scale smoke
 	snakemake --cores $(CORES) $(SMOKE)
 
 quick: setup  ## what one runs before each commit, under two minutes on two idle cores: lint, fast tests
@@ -45,6 +47,9 @@ lint: setup  ## formatting, lint and types, all of which must be clean
 bench: setup  ## measured ratios against stable-baselines3, stock Meta-World and imitation
 	sh benchmarks/imitation_environment.sh
 	python -m benchmarks
+
+bench-node: setup  ## what this machine trains a second, on its GPU if it has one: eight minutes
+	python -m benchmarks.node --workers $(CORES)
 
 audit:  ## look constraints.txt up in a database of known vulnerabilities; needs the network
 	$(PYTHON) -m venv build/audit

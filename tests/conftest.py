@@ -9,11 +9,13 @@ import torch
 from mtcsirl.cli import THREADS
 from mtcsirl.settings import SacSettings
 from mtcsirl.settings.runs import AgentRunSettings
+from mtcsirl.worlds.drawable import lacking
 
 for _name in THREADS:
     os.environ.setdefault(_name, "1")
 
 CHECKOUT = Path(__file__).resolve().parents[1]
+needs_rendering = pytest.mark.skipif(lacking() is not None, reason=str(lacking()))
 
 
 @pytest.fixture(scope="session")

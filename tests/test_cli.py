@@ -62,7 +62,7 @@ def test_every_rule_has_a_verb_and_every_stage_a_rule(checkout: Path) -> None:
 
 
 def test_the_library_knows_neither_snakemake_nor_argparse(checkout: Path) -> None:
-    for path in (checkout / "src").rglob("*.py"):
+    for path in (checkout / "src/mtcsirl").rglob("*.py"):
         text = path.read_text()
         assert not re.search(r"^\s*(import|from) snakemake", text, re.MULTILINE), path
         if "commands" not in path.parts and path.name != "cli.py":

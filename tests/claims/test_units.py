@@ -89,7 +89,7 @@ def test_criteria_of_a_unit_stand_side_by_side(findings):
     assert texts["difference"].startswith("SAC: yes, +0.4")
     assert texts["difference"].endswith("p < 0.001")
     assert texts["effect"].endswith("closer with probability 1.00")
-    nothing = unit_texts(finding("C7", change=lambda rows: missing(rows, stage="transfer")).units[0])
+    nothing = unit_texts(finding("C7", change=lambda rows: missing(rows, stage="transfer")).units[1])
     assert nothing["judged"] == "not run"
     assert {nothing[name] for name in ("ours", "measure", "ours_in_prediction", "difference", "effect")} == {"–"}
 
@@ -187,3 +187,20 @@ def test_an_own_cs_reward_is_judged_without_the_papers_numbers():
     found = finding("C7", settings=settings)
     assert found.verdict == "reproduced"
     assert {unit.cs_reward for unit in found.units} == {"velocity"}
+
+
+@pytest.mark.parametrize("lost", ["nothing", "push-back"])
+def test_the_mean_over_tasks_never_counts(lost):
+    """A task whose agents are missing leaves no mean over tasks: one unit of four per cs-reward is not run, not two."""
+    found = finding("C7", change=lambda rows: missing(rows, stage="transfer", method="mt_csirl", task=lost))
+    assert [unit.state for unit in found.units if unit.what == "all unseen tasks"] == ["not judged"] * 2
+    assert found.reason.endswith("of 8 units")
+    assert ("2 not run" in found.reason) == (lost == "push-back")
+
+
+def test_r_itself_is_called_r(findings):
+    """Beside a partial correlation; a speed is no r."""
+    texts = {f.name: unit_texts(f.units[0]) for f in findings}
+    assert texts["C9"]["ours"].startswith("r = 0.")
+    assert texts["C9"]["paper"] == "r = 0.86", "action norm"
+    assert not texts["C7"]["ours"].startswith("r = ")

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 
+from mtcsirl import cli
 from mtcsirl.settings.loading import load
 from mtcsirl.study.ablations import ABLATIONS
 from mtcsirl.study.design import ARTEFACTS, design
@@ -49,13 +50,24 @@ def test_collecting_targets_need_the_whole_study(snakemake: Snakemake, target: s
     assert planned[target] == 1
 
 
-def test_a_run_can_be_asked_for_by_its_path(snakemake: Snakemake) -> None:
-    planned = dry_run(snakemake, "desk", "results/expert/velocity/reach-t1/s0/gate.json")
+@pytest.mark.parametrize("folder", ["expert/velocity/reach-t1/s0", "results/expert/velocity/reach-t1/s0"])
+def test_one_run_can_be_asked_for(
+    snakemake: Snakemake,
+    workspace: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    folder: str,
+) -> None:
+    monkeypatch.chdir(workspace)
+    assert cli.main(["target", folder]) == 0
+    planned = dry_run(snakemake, "desk", capsys.readouterr().out.strip())
     assert planned == {"train_expert": 1}
+    assert cli.main(["target", "expert/velocity/reach-t1/s7"]) == 2
+    assert "is no run of the study at scale desk" in capsys.readouterr().err
 
 
 def test_a_run_outside_the_study_is_refused(snakemake: Snakemake) -> None:
-    done = snakemake("-n", "results/expert/velocity/reach-t1/s7/gate.json")
+    done = snakemake("-n", "results/expert/velocity/reach-t1/s7/.0123456789abcdef.made")
     assert done.returncode != 0
     assert "expert/velocity/reach-t1/s7 is no run of the study at scale desk" in done.stdout + done.stderr
 

@@ -14,6 +14,7 @@ from mtcsirl.episodes.policy import save_policy
 from mtcsirl.errors import UserError
 from mtcsirl.exports.video import HEADER, clip_frames, clip_of, render_video
 from mtcsirl.settings import SacSettings
+from tests.conftest import needs_rendering
 
 
 @pytest.fixture(scope="module")
@@ -30,6 +31,7 @@ def test_task_and_target_come_from_the_run(folder):
     assert clip_of(folder, task="push-back", target=2, label="SAC").task == "push-back"
 
 
+@needs_rendering
 def test_gif_side_by_side_at_the_robots_speed(folder, tmp_path):
     path = tmp_path / "both.gif"
     arguments = ["video", str(folder), str(folder), "--label", "Expert", "--label", "SAC", "--output", str(path)]
@@ -44,6 +46,7 @@ def test_gif_side_by_side_at_the_robots_speed(folder, tmp_path):
     assert red[:, 128:].sum() > 200
 
 
+@needs_rendering
 def test_frames_move_and_equal_seeds_give_equal_frames(folder):
     clip = clip_of(folder)
     first, second = (list(clip_frames(clip, 8, 0, 96)) for _ in range(2))
@@ -53,6 +56,7 @@ def test_frames_move_and_equal_seeds_give_equal_frames(folder):
     assert not np.array_equal(first[-1], modes[-1])
 
 
+@needs_rendering
 @pytest.mark.skipif(importlib.util.find_spec("imageio_ffmpeg") is None, reason="imageio-ffmpeg is not installed")
 def test_mp4(folder, tmp_path):
     import imageio_ffmpeg

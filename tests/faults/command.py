@@ -16,7 +16,7 @@ CHANGES = {
     "progress.checkpoint_every": 200,
 }
 RESULTS = {"curve.csv", "evaluation.csv", "gate.json", "policy.json", "policy.safetensors", "settings.json"}
-EXPECTED = RESULTS | {"provenance.json"}
+EXPECTED = RESULTS | {"provenance.json", "identity.json"}
 
 
 def mtcsirl(*words: str) -> list[str]:

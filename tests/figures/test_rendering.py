@@ -1,6 +1,5 @@
 """Rendered figures: upright, not mirrored, and pointing where they say."""
 
-import ctypes.util
 import os
 import subprocess
 import sys
@@ -14,6 +13,8 @@ from mtcsirl.figures.data import FigureData
 from mtcsirl.settings import Settings
 from mtcsirl.worlds.environments import make_environment
 from mtcsirl.worlds.rendering import CameraPose, SceneRenderer, camera_pose
+from tests import hidden
+from tests.conftest import needs_rendering
 
 SIZE = (320, 240)
 
@@ -33,6 +34,7 @@ def test_projection_worked_out_by_hand():
     np.testing.assert_allclose(pose.project(points, 200, 100), expected)
 
 
+@needs_rendering
 @pytest.mark.parametrize("camera", ["corner2", "corner", "topview"])
 def test_goal_sphere_is_seen_where_it_projects_to(environment, camera):
     simulator = environment.simulator
@@ -48,9 +50,6 @@ def test_goal_sphere_is_seen_where_it_projects_to(environment, camera):
 def test_unknown_camera_names_the_allowed_ones(environment):
     with pytest.raises(UserError, match=r"unknown camera 'ceiling'; allowed: .*corner2"):
         camera_pose(environment.simulator.model, environment.simulator.data, "ceiling")
-
-
-NEEDS_OSMESA = pytest.mark.skipif(ctypes.util.find_library("OSMesa") is None, reason="libosmesa6 is not installed")
 
 
 def _drawn(before: str = "", **variables: str) -> str:
@@ -76,16 +75,7 @@ def _drawn(before: str = "", **variables: str) -> str:
 
 
 def test_machine_without_osmesa_is_told_the_package():
-    hidden = """
-import ctypes
-class WithoutOsmesa(ctypes.CDLL):
-    def __init__(self, name, *rest, **more):
-        if name and "OSMesa" in str(name):
-            raise OSError(f"{name}: cannot open shared object file")
-        super().__init__(name, *rest, **more)
-ctypes.CDLL, ctypes.cdll = WithoutOsmesa, ctypes.LibraryLoader(WithoutOsmesa)
-"""
-    assert "apt-get install libosmesa6" in _drawn(hidden)
+    assert "apt-get install libosmesa6" in _drawn(hidden.OSMESA)
 
 
 @pytest.mark.parametrize(
@@ -95,8 +85,8 @@ ctypes.CDLL, ctypes.cdll = WithoutOsmesa, ctypes.LibraryLoader(WithoutOsmesa)
         ({"MUJOCO_GL": "egl", "PYOPENGL_PLATFORM": "osmesa"}, "PYOPENGL_PLATFORM=osmesa: MUJOCO_GL=egl draws by egl;"),
         ({"MUJOCO_GL": "nonsense"}, "MUJOCO_GL=nonsense: MuJoCo knows no such back end; unset it"),
         ({"MUJOCO_GL": "glfw"}, "MUJOCO_GL=glfw: draws by glfw and needs a display"),
-        pytest.param({"MUJOCO_GL": "off"}, "drawn", marks=NEEDS_OSMESA),
-        pytest.param({"MUJOCO_GL": "osmesa", "PYOPENGL_PLATFORM": "osmesa"}, "drawn", marks=NEEDS_OSMESA),
+        pytest.param({"MUJOCO_GL": "off"}, "drawn", marks=needs_rendering),
+        pytest.param({"MUJOCO_GL": "osmesa", "PYOPENGL_PLATFORM": "osmesa"}, "drawn", marks=needs_rendering),
     ],
     ids=str,
 )
@@ -104,6 +94,7 @@ def test_a_variable_that_keeps_pictures_from_being_drawn_is_named(variables, say
     assert says in _drawn(**variables)
 
 
+@needs_rendering
 def test_sawyer_arrow_ends_between_the_fingers():
     picture, tip = figure_9.end_effector_scene()
     figure = figure_9.compose(picture, tip)
@@ -124,6 +115,7 @@ def test_setups_are_the_studys():
     assert not {task for task, _ in tasks.train} & {task for task, _ in tasks.test}
 
 
+@needs_rendering
 def test_overview_shows_every_scene_once_where_it_belongs():
     settings = Settings(scale="smoke")
     shot = figure_8.shoot(("drawer-close", 0), 0)

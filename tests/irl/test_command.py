@@ -17,3 +17,17 @@ def test_a_run_has_the_settings_of_its_own_tasks(demonstrations, tmp_path):
     settings = read_json(output / "settings.json")
     assert settings["irl"]["warm_up_iterations"] == 1
     assert "push-back" not in settings["scripted_steps"]
+
+
+def test_workers_change_no_byte(demonstrations, tmp_path):
+    files = [str(file) for file in demonstrations]
+    given = ["--method", "mt_csirl", "--cs-reward", "velocity", "--seed", "7", "--scale", "smoke"]
+    given += ["--set", "irl.iterations=1", "--demonstrations", *files]
+    for workers in ("0", "2"):
+        assert main(["learn-reward", *given, "--workers", workers, "--output", str(tmp_path / workers)]) == 0
+    left = sorted(file.name for file in (tmp_path / "0").iterdir() if file.name != "provenance.json")
+    assert "reward.safetensors" in left
+    assert "identity.json" in left
+    for name in left:
+        if (tmp_path / "0" / name).is_file():
+            assert (tmp_path / "0" / name).read_bytes() == (tmp_path / "2" / name).read_bytes(), name

@@ -13,6 +13,7 @@ from mtcsirl.report.content import (
     StageCost,
     TableView,
     TargetLine,
+    UnitLine,
     WhatWasRun,
 )
 from mtcsirl.results.notes import Note
@@ -38,6 +39,13 @@ UNIT = {
 }
 
 
+UNITS = (
+    UnitLine(UNIT, "met", "like SAC", 0.03, ("power 52 % at these spreads and seeds, were both equal", "a <note>")),
+    UnitLine(UNIT | {"unit": "velocity, all of them"}, "not judged", value=0.1, judged=False),
+)
+DEPARTURES = (("for", "settings were chosen until <it> passed"), ("against", "another thing"))
+
+
 def made_up_report(scale: str = "desk", **changes) -> ReportData:
     data = ReportData(
         run=WhatWasRun(
@@ -59,8 +67,10 @@ def made_up_report(scale: str = "desk", **changes) -> ReportData:
                 "mean distance to the target at most 15 % & mean success at least 90 %",
                 VERDICTS[number % len(VERDICTS)],
                 "1 met of 1 units",
-                (UNIT,),
+                UNITS,
                 "distance to the target / target: velocity 0.03 [0.01, 0.05], action norm 0.02 [0.01, 0.04]",
+                gate=number == 0,
+                departures=DEPARTURES if number == 0 else (),
             )
             for number in range(12)
         ),
@@ -78,6 +88,7 @@ def made_up_report(scale: str = "desk", **changes) -> ReportData:
             DeviationLine("irl.schedule", "batched", "as_printed", "loop over tasks as printed, or one tensor program"),
         ),
         targets=tuple(TargetLine(name, f"makes {name}", 3, 4, 5400.0) for name in (*ARTEFACTS, "claims", "all")),
+        beforehand="Thresholds were fixed before; settings were not.",
     )
     return replace(data, **changes)
 

@@ -10,7 +10,7 @@ from mtcsirl.claims.claims import claims_json, judge
 from mtcsirl.errors import UserError
 from mtcsirl.figures.style import figure_bytes, new_figure
 from mtcsirl.files import storage
-from mtcsirl.report.collect import collect
+from mtcsirl.report.collect import claims_of, collect
 from mtcsirl.report.measured import measured
 from mtcsirl.report.page import build_report
 from mtcsirl.results.notes import Note
@@ -20,6 +20,8 @@ from mtcsirl.study.design import ARTEFACTS, design
 from mtcsirl.study.outputs import OUTPUTS
 from mtcsirl.tables.grid import Column, Grid, Line
 from mtcsirl.tables.table import Table
+from tests.claims.made_up import SETTINGS as JUDGED
+from tests.claims.made_up import judge_all
 
 TABLE = Table(
     "table_1",
@@ -95,8 +97,40 @@ def test_claims_are_the_judged_ones(results):
     assert [claim.name for claim in claims] == [f"C{number}" for number in range(1, 14)]
     assert {claim.verdict for claim in claims} == {"not run"}
     assert claims[0].locus == "Table 2, row Expert"
-    assert claims[0].units[0]["unit"].endswith("reach-wall")
+    assert claims[0].units[0].texts["unit"].endswith("reach-wall")
+    assert [claim.name for claim in claims if claim.gate] == ["C1", "C2"]
+    assert {leans for claim in claims for leans, _ in claim.departures} == {"for", "against"}
+    assert collect(settings, root / "page.html").beforehand.startswith("Thresholds were fixed before")
     assert all(claim.criterion and claim.reason for claim in claims)
+
+
+@pytest.mark.parametrize("text", ["[]", '{"claims": [{"name": "C1"}]}', '{"claims": 3}', "not json"])
+def test_foreign_claims_are_named(results, text):
+    settings, root = results
+    path = root / "results" / "claims" / "claims.json"
+    kept = storage.read_bytes(path)
+    try:
+        storage.write_text(path, text)
+        with pytest.raises(UserError, match=r"claims\.json") as caught:
+            collect(settings, root / "page.html")
+        assert "\n" not in str(caught.value)
+    finally:
+        storage.write_bytes(path, kept)
+
+
+def test_units_keep_their_state_outcome_power_and_remarks():
+    """Of a made-up study: C3's power, C7's mean over tasks, which is not judged, C4's remarks."""
+    c3, c4, c7 = claims_of(claims_json(judge_all(names=("C3", "C4", "C7")), JUDGED))
+    assert {unit.outcome for unit in c3.units} == {"like SAC"}
+    assert all(unit.remarks[0].startswith("power ") for unit in c3.units)
+    assert not any(remark.startswith("power ") for unit in c7.units for remark in unit.remarks)
+    assert any(remark.startswith("r by set: ") for remark in c4.units[0].remarks)
+    assert [unit.texts["unit"] for unit in c7.units if not unit.judged] == [
+        "action norm, all unseen tasks",
+        "velocity, all unseen tasks",
+    ]
+    assert (c7.judged, len(c7.units)) == (8, 10)
+    assert c7.measured.count("(4 units)") == 2
 
 
 def test_gates_are_counted_by_agent_task_and_cs_reward(results):
@@ -177,8 +211,9 @@ def test_a_foreign_table_is_named(results, text):
         storage.write_json(path, TABLE.as_json())
 
 
-def unit(cs_reward, value, low, high):
-    return {"cs_reward": cs_reward, "measure": {"name": "part closed", "value": value, "low": low, "high": high}}
+def unit(cs_reward, value, low, high, *, name="part closed", answer="met", unbounded=False):
+    measure = {"name": name, "value": value, "low": low, "high": high, "unbounded": unbounded}
+    return {"cs_reward": cs_reward, "answer": answer, "measure": measure}
 
 
 def test_what_a_claim_measured_is_one_line():
@@ -190,3 +225,49 @@ def test_what_a_claim_measured_is_one_line():
         "part closed: velocity 0.05 [0.00, 0.07] (2 units)"
     )
     assert measured([unit("velocity", None, None, None)]) == measured([]) == measured([{}]) == "nothing measured yet"
+
+
+def test_units_for_comparison_are_not_measured():
+    shown = unit("velocity", 0.2, 0.1, 0.3, answer="not judged")
+    assert measured([shown, unit("velocity", 0.84, 0.8, 0.88)]) == "part closed: velocity 0.84 [0.80, 0.88]"
+    assert measured([shown]) == "nothing measured yet"
+    counted = measured([shown | {"answer": "unclear"}, unit("velocity", 0.84, 0.8, 0.88)])
+    assert counted == "part closed: velocity 0.20 to 0.84 [0.10, 0.88] (2 units)"
+
+
+def test_units_without_their_precondition_are_counted_alone():
+    blocked = unit("velocity", 3.9, -1.0, 9.0, answer="precondition not met")
+    assert measured([blocked, unit("velocity", 0.84, 0.8, 0.88)]) == (
+        "part closed: velocity 0.84 [0.80, 0.88]; 1 unit lacks its precondition"
+    )
+    assert measured([blocked, blocked]) == "2 units lack their precondition"
+
+
+def test_intervals_without_finite_ends_are_said_in_words():
+    endless, known = unit("velocity", 0.84, None, None, unbounded=True), unit("velocity", 0.9, 0.8, 1.0)
+    assert measured([endless]) == "part closed: velocity 0.84 [no finite bounds]"
+    assert measured([endless, known]) == (
+        "part closed: velocity 0.84 to 0.90 [0.80, 1.00; no finite bounds for 1] (2 units)"
+    )
+    assert measured([unit("velocity", 0.84, None, None)]) == "part closed: velocity 0.84", "one seed: no interval"
+
+
+def test_endless_intervals_reach_the_page_from_the_claims():
+    """SAC's gap is not surely there: Fieller's set has no ends; with SAC's gap there it has."""
+    wide = claims_json(judge_all(change=_scattered_sac, names=("C7",)), JUDGED)
+    (claim,) = claims_of(wide)
+    assert "no finite bounds" in claim.measured
+    assert any("no finite bounds" in unit.texts["measure"] for unit in claim.units)
+    (claim,) = claims_of(claims_json(judge_all(names=("C7",)), JUDGED))
+    assert "no finite bounds" not in claim.measured
+
+
+def _scattered_sac(rows):
+    """SAC's seeds alternate between the target and far below it."""
+    own = (rows["stage"] == "train_sac") & (rows["metric"] == "velocity")
+    return rows.assign(value=rows["value"].mask(own, 0.8 - 1.2 * (rows["seed"] == 0)))
+
+
+def test_measures_are_told_apart():
+    units = [unit("velocity", 0.5, 0.4, 0.6, name=name) for name in ("distance lost", "success lost")]
+    assert measured(units) == "distance lost: velocity 0.50 [0.40, 0.60]; success lost: velocity 0.50 [0.40, 0.60]"

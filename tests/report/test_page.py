@@ -87,9 +87,48 @@ def test_numbers_of_the_run(page):
 
 
 def test_verdicts_are_counted_and_worded(page):
-    for verdict in ("reproduced", "partially", "not reproduced", "inconclusive", "precondition not met", "not run"):
+    for verdict in ("partially", "not reproduced", "inconclusive", "precondition not met", "not run"):
         assert f">{verdict}: 2</span>" in page
         assert page.count(f">{verdict}</span>") == 4, "once on the first screen, once above its numbers"
+
+
+def test_gates_are_called_gates_and_counted_apart(page):
+    claims, gates = re.findall(r"<p>(?:Claims|Gates): (.*?)</p>", page)
+    assert ">reproduced: 1<" in claims
+    assert re.findall(r">([\w ]+): (\d)<", gates) == [("reproduced", "1")]
+    assert page.count(">reproduced (gate)</span>") == 2, "once on the first screen, once above its numbers"
+    assert page.count(">reproduced</span>") == 2, "the claim that is none"
+    assert page.count("<h3>C1 (gate) ") == 1
+    assert "<h3>C2 (gate)" not in page
+
+
+def test_which_way_settings_lean_stands_where_the_claim_is(page):
+    first = page.split('<ol class="verdicts">')[1].split("</li>")[0]
+    assert "<strong>Leans for it:</strong> settings were chosen until &lt;it&gt; passed." in first
+    assert "<strong>Leans against it:</strong> another thing." in first
+    numbers = page.split('id="claim-C1"')[1].split("</article>")[0]
+    assert "<strong>Leans for the claim:</strong> settings were chosen until" in numbers
+    assert page.count("Leans for") == 2, "no claim without departures has any"
+    assert "<p>Thresholds were fixed before; settings were not.</p>" in page
+
+
+def test_units_for_comparison_are_set_apart(page):
+    numbers = page.split('id="claim-C1"')[1].split("</article>")[0]
+    assert "<summary>Numbers of C1 (1, and 1 for comparison)</summary>" in numbers
+    assert re.findall(r"<tr class=\"shown\"><th scope=\"row\">(.*?)</th>", numbers) == ["velocity, all of them"]
+    assert "those in grey are shown for comparison and count nowhere" in numbers
+    data = made_up_report()
+    alone = build_report(replace(data, claims=(replace(data.claims[0], units=data.claims[0].units[:1]),)))
+    assert "for comparison" not in alone
+    assert "<summary>Numbers of C1 (1)</summary>" in alone
+
+
+def test_outcome_power_and_remarks_of_a_unit_can_be_read(page):
+    cells = page.split('id="claim-C1"')[1].split("<tbody>")[1].split("</tr>")[0]
+    assert '<span class="badge good">met</span> like SAC</td>' in cells
+    for remark in ("power 52 % at these spreads and seeds, were both equal", "a &lt;note&gt;"):
+        assert f"beside it:</span> {remark}</div>" in cells
+    assert 'data-sort="0.03"' in cells, "a column of sentences sorts by its number"
 
 
 def test_first_answers_what_holds(page):
@@ -104,7 +143,8 @@ def test_first_answers_what_holds(page):
 def test_numbers_behind_a_claim_stand_side_by_side(page):
     numbers = page.split('id="claim-C1"')[1].split("</table>")[0]
     assert "<caption>C1" in numbers
-    for text in (*COLUMNS.values(), "yes [0.77, 0.85]", "p &lt; 0.001", "12.1 [6.0, 18.2]"):
+    headings = [heading for name, heading in COLUMNS.items() if name != "unit"]
+    for text in (*headings, "yes [0.77, 0.85]", "p &lt; 0.001", "12.1 [6.0, 18.2]"):
         assert text.replace("'", "&#39;") in numbers
 
 

@@ -1,3 +1,6 @@
+import itertools
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from matplotlib.colors import to_rgb
@@ -9,6 +12,7 @@ from mtcsirl.figures.claims import VERDICT_COLOURS, caption, claims_figure
 from mtcsirl.files.storage import read_json, read_text, write_json
 from mtcsirl.report.results_page import results_page
 from mtcsirl.results.rows import evaluation_rows
+from mtcsirl.results.statistics import Estimate
 from mtcsirl.settings import Settings
 from mtcsirl.study.design import design
 from mtcsirl.tables import TABLES
@@ -77,6 +81,45 @@ def test_nothing_of_the_figure_is_cut_off(findings):
             if text.get_text():
                 assert figure.bbox.x0 - 1 <= box.x0, text
                 assert box.x1 <= figure.bbox.x1 + 1, text
+
+
+def collisions(figure):
+    """Texts and labels of a claim that lie over its own others or over the next claim's."""
+    figure.canvas.draw()
+    boxes = [
+        [text.get_window_extent() for text in (*axes.texts, *(axes.get_yticklabels() if axes.axison else ()))]
+        for axes in figure.axes
+    ]
+    rows = [left + right for left, right in zip(boxes[::2], boxes[1::2], strict=True)]
+    pairs = [pair for row in rows for pair in itertools.combinations(row, 2)]
+    pairs += [pair for above, below in itertools.pairwise(rows) for pair in itertools.product(above, below)]
+    return [pair for pair in pairs if pair[0].shrunk(0.98, 0.9).overlaps(pair[1].shrunk(0.98, 0.9))]
+
+
+@pytest.mark.parametrize("width", [46, 80])
+def test_no_text_of_the_figure_lies_over_another(findings, width, monkeypatch):
+    """C8's sentence stands beside its long labels; in wider lines it would lie under them."""
+    monkeypatch.setattr("mtcsirl.figures.claims._SENTENCE", width)
+    assert bool(collisions(claims_figure(findings, SETTINGS))) == (width > 46)
+
+
+def test_an_interval_that_goes_on_ends_in_an_arrow(findings):
+    def arrows(finding):
+        axes = claims_figure([finding], SETTINGS).axes[1]
+        return [line.get_marker() for line in axes.lines if line.get_marker() in ("<", ">")]
+
+    unit = replace(findings[4].units[0], value=Estimate(0.8, -np.inf, np.inf, 5))
+    assert arrows(replace(findings[4], units=(unit, *findings[4].units[1:]))) == ["<", ">"]
+    assert arrows(findings[4]) == []
+
+
+def test_the_papers_r_is_no_partial_r(findings):
+    """Its triangle is open; where ours and the paper's are the same measure it is filled."""
+    faces = {}
+    for finding, axes in zip(findings, claims_figure(findings, SETTINGS).axes[1::2], strict=True):
+        faces[finding.name] = {line.get_markerfacecolor() for line in axes.lines if line.get_marker() == "v"}
+    assert faces["C4"] == faces["C9"] == {"white"}
+    assert faces["C5"] == faces["C7"] == {"0.25"}
 
 
 def test_figure_of_nothing_and_of_smoke_says_so():

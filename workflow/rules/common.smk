@@ -12,6 +12,7 @@ from functools import cache
 from pathlib import Path
 
 from snakemake.exceptions import WorkflowError
+from snakemake.logging import logger
 
 from mtcsirl.errors import UserError
 from mtcsirl.extensions import VARIABLE
@@ -24,9 +25,12 @@ from mtcsirl.study.ablations import ABLATIONS
 from mtcsirl.study.artefacts import HEAT_MAPS, settle_artefacts
 from mtcsirl.study.design import ARTEFACTS, CLAIMS, design
 from mtcsirl.study.keys import FIELDS
-from mtcsirl.study.plan import load_rates, request
+from mtcsirl.study.plan import load_rates, plan, request
 from mtcsirl.study.runs import Baseline, Demonstrations, Expert, IrlRun, Score, Transfer
+from mtcsirl.study.screen import EXPECTED
 from mtcsirl.study.standing import settle
+from mtcsirl.study.status import before_it_starts
+from mtcsirl.worlds import drawable
 
 gc.set_threshold(100_000)  # a DAG is many objects that all stay: looking for garbage takes a fifth of building it
 
@@ -50,17 +54,26 @@ RESULTS = SETTINGS.results
 os.environ["PATH"] = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
 
 os.environ[VARIABLE] = os.pathsep.join(SETTINGS.extensions)
+# whether scenes can be drawn is one answer for the whole workflow
+os.environ[drawable.VARIABLE] = drawable.lacking() or ""
 
 
 envvars:
     "PATH",
     VARIABLE,
+    drawable.VARIABLE,
 
 
 pathvars:
     results=SETTINGS.results,
     figures=SETTINGS.figures,
     logs=f"{SETTINGS.results}/logs",
+
+
+onstart:
+    if workflow.is_main_process:
+        logger.info(before_it_starts(STUDY, SETTINGS))
+        EXPECTED.update((s.stage, 3600 * s.core_hours / s.jobs) for s in plan(STUDY, SETTINGS, RATES))
 
 
 wildcard_constraints:

@@ -6,9 +6,7 @@ import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Literal
-
-import pandas as pd
+from typing import TYPE_CHECKING, Any, Literal
 
 from mtcsirl.episodes.evaluation import COLUMNS, Row
 from mtcsirl.episodes.gates import metric_limit, relative_distance
@@ -18,6 +16,9 @@ from mtcsirl.files import storage
 from mtcsirl.rewards.mixture import RewardMixture
 from mtcsirl.settings.runs import AgentRunSettings
 from mtcsirl.transitions import RewardFunction
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 
 @dataclass(frozen=True)
@@ -77,6 +78,8 @@ class TrainedAgent:
 
     def save(self, folder: Path | str) -> None:
         """Write policy.safetensors, policy.json, curve.csv, evaluation.csv and gate.json."""
+        import pandas as pd
+
         folder = Path(folder)
         save_policy(self.policy, folder)
         storage.write_csv(folder / "curve.csv", self.curve)

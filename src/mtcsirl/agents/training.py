@@ -12,7 +12,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 import torch
 
 from mtcsirl.agents import resume
@@ -148,6 +147,8 @@ class Training:
 
     def finish(self) -> list[TrainedAgent]:
         """Evaluate what was kept and judge it by the gates."""
+        import pandas as pd
+
         last = [self.policy(agent) for agent in range(len(self.jobs))]
         kept = [chosen.policy or own for chosen, own in zip(self.selections, last, strict=True)]
         evaluations = self._evaluate(kept)

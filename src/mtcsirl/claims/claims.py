@@ -152,6 +152,7 @@ def _unit_json(unit: Unit) -> dict[str, Any]:
         "measure": {
             "name": unit.measure,
             **_plain(unit.value),
+            "unbounded": bool(np.isinf([unit.value.low, unit.value.high]).any()),
             "holds": _plain(unit.holds),
             "published": _number(unit.paper_value),
         },

@@ -135,9 +135,8 @@ def _all_unseen(evidence: Evidence, rules: Rules, unit: Unit) -> Unit:
         f'"not as strongly as the ground truth": {answer}; d is {test.difference:+.2f} [{test.low:+.2f}, '
         f"{test.high:+.2f}] larger than the experts'"
     )
-    judgeable = unit.state in (MET, NOT_MET, UNCLEAR)
     notes = (*unit.notes, note) if experts.n and ours.n else unit.notes
-    return replace(unit, what="all unseen tasks", state=SHOWN if judgeable else unit.state, notes=notes)
+    return replace(unit, what="all unseen tasks", state=SHOWN, notes=notes)
 
 
 def better_than(evidence: Evidence, rules: Rules) -> Iterator[Unit]:

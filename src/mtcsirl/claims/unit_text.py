@@ -32,7 +32,7 @@ def unit_texts(unit: Unit) -> dict[str, str]:
     return {
         "unit": f"{unit.cs_reward.replace('_', ' ')}, {unit.what}",
         "judged": f"{unit.state}: {unit.outcome}" if unit.outcome else unit.state,
-        "paper": "no number" if np.isnan(unit.paper.mean) else _spread(unit.paper),
+        "paper": "no number" if np.isnan(unit.paper.mean) else _r(unit) + _spread(unit.paper),
         "ours": _ours(unit),
         "measure": _measure(unit),
         "ours_in_prediction": _prediction(unit),
@@ -40,7 +40,7 @@ def unit_texts(unit: Unit) -> dict[str, str]:
         "difference": _difference(unit),
         "effect": _effect(unit),
         "why": unit.reason,
-        "notes": "; ".join([*_power(unit), *unit.notes]) or DASH,
+        "notes": "; ".join(filter(None, [power_text(unit.power), *unit.notes])) or DASH,
     }
 
 
@@ -48,7 +48,12 @@ def _ours(unit: Unit) -> str:
     if unit.ours.n == 0:
         return DASH
     success = "" if np.isnan(unit.success.mean) else f", success {100 * unit.success.mean:.0f} %"
-    return f"{_spread(unit.ours)}, n={unit.ours.n}{success}"
+    return f"{_r(unit)}{_spread(unit.ours)}, n={unit.ours.n}{success}"
+
+
+def _r(unit: Unit) -> str:
+    """Ours and the paper's number are r itself where the criterion looks at the partial correlation."""
+    return "r = " if unit.measure == PARTIAL else ""
 
 
 def _measure(unit: Unit) -> str:
@@ -67,10 +72,9 @@ def _prediction(unit: Unit) -> str:
     return f"{text}, uninformative: spreads {unit.paper.std:.2g} and {unit.ours.std:.2g} (F = {unit.spreads.ratio:.3g})"
 
 
-def _power(unit: Unit) -> list[str]:
-    if np.isnan(unit.power):
-        return []
-    return [f"power {100 * unit.power:.0f} % at these spreads and seeds, were both equal"]
+def power_text(power: float) -> str:
+    """Of a test of equivalence; empty where there is none."""
+    return "" if np.isnan(power) else f"power {100 * power:.0f} % at these spreads and seeds, were both equal"
 
 
 def _difference(unit: Unit) -> str:
@@ -102,7 +106,7 @@ def _spread(summary: Summary) -> str:
 
 
 def _estimate(estimate: Estimate, digits: int = 2) -> str:
-    return f"{estimate.value:.{digits}f}{_bounds(Interval(estimate.low, estimate.high), digits)}"
+    return f"{_number(estimate.value, digits)}{_bounds(Interval(estimate.low, estimate.high), digits)}"
 
 
 def _bounds(interval: Interval, digits: int = 2) -> str:
@@ -110,4 +114,9 @@ def _bounds(interval: Interval, digits: int = 2) -> str:
         return ""
     if np.isinf([interval.low, interval.high]).any():
         return " [no finite bounds: SAC's gap is not surely there]"
-    return f" [{interval.low:.{digits}f}, {interval.high:.{digits}f}]"
+    return f" [{_number(interval.low, digits)}, {_number(interval.high, digits)}]"
+
+
+def _number(value: float, digits: int) -> str:
+    """What rounds to zero has no sign."""
+    return f"{round(value, digits) + 0.0:.{digits}f}"

@@ -104,6 +104,26 @@ def add_cs_reward(verb: argparse.ArgumentParser) -> None:
     verb.add_argument("--cs-reward", required=True, type=cs_reward, metavar="NAME", help="velocity, action_norm, ...")
 
 
+def add_device(verb: argparse.ArgumentParser) -> None:
+    """``--device``: the settings key ``sac.device``, which is part of a run's identity."""
+    verb.add_argument(
+        "--device",
+        dest="set",
+        action="append",
+        type=lambda name: f"sac.device={name}",
+        default=[],
+        metavar="NAME",
+        help="cpu, cuda or cuda:INDEX: the same as --set sac.device=NAME",
+    )
+
+
+def add_workers(verb: argparse.ArgumentParser) -> None:
+    """``--workers``."""
+    verb.add_argument(
+        "--workers", type=natural, default=0, metavar="N", help="processes that step the environments; default none"
+    )
+
+
 def add_output(verb: argparse.ArgumentParser, default: str | None = None) -> None:
     """``--output``."""
     verb.add_argument(

@@ -9,7 +9,7 @@ from mtcsirl.commands.drawing import write_figure
 from mtcsirl.commands.remedy import Verb, advised
 from mtcsirl.settings import Settings
 from mtcsirl.study.ablations import ABLATIONS
-from mtcsirl.study.artefacts import HEAT_MAPS, sign_artefact, unsign_artefact
+from mtcsirl.study.artefacts import HEAT_MAPS, not_rendered, sign_artefact, unsign_artefact
 from mtcsirl.study.design import ARTEFACTS, CLAIMS, design
 from mtcsirl.study.runs import IrlRun, Score
 from mtcsirl.study.standing import DONE, standing
@@ -111,6 +111,8 @@ def _table(parsed: argparse.Namespace) -> None:
 def _figure(parsed: argparse.Namespace) -> None:
     from mtcsirl.figures import figure_spec
     from mtcsirl.figures.data import FigureData
+    from mtcsirl.figures.not_rendered import caption as why_not_rendered
+    from mtcsirl.figures.not_rendered import words as in_words
     from mtcsirl.results.rows import curve_rows, point_rows, score_rows
 
     settings = study_settings(parsed)
@@ -120,7 +122,11 @@ def _figure(parsed: argparse.Namespace) -> None:
     frames = {what: read(study, settings, partial=parsed.partial) for what, read in readers.items()}
     spec = figure_spec(name)
     data = FigureData(settings=settings, **frames)
-    figure, caption = spec.draw(data), spec.caption(data)
+    why = not_rendered(name, settings)
+    if why is None:
+        figure, caption = spec.draw(data), spec.caption(data)
+    else:
+        figure, caption = in_words(spec.title, why, f"snakemake --cores 2 {name}"), why_not_rendered(why)
     home = Path(settings.figures)
     folder = parsed.output or home
     write_figure(folder / name, figure, caption)

@@ -1,6 +1,8 @@
 """The verbs that train, learn and measure: one per stage of the DAG, and ``evaluate``."""
 
 import argparse
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 
@@ -8,10 +10,12 @@ from mtcsirl.commands.arguments import (
     Verbs,
     add_agent,
     add_cs_reward,
+    add_device,
     add_identity,
     add_output,
     add_run_settings,
     add_verb,
+    add_workers,
     check_experiment,
     method,
     path,
@@ -57,6 +61,7 @@ def _train_expert(verbs: Verbs) -> None:
     )
     add_agent(verb)
     add_run_settings(verb)
+    add_device(verb)
     add_output(verb)
     add_identity(verb)
 
@@ -80,6 +85,7 @@ def _train_sac(verbs: Verbs) -> None:
     )
     add_agent(verb, cs_reward=False)
     add_run_settings(verb)
+    add_device(verb)
     add_output(verb)
     add_identity(verb)
 
@@ -123,7 +129,8 @@ def _learn_reward(verbs: Verbs) -> None:
         of_members = partial(irl_run, experiment=experiment, tasks=tasks, method=parsed.method)
         settings = run_settings(parsed, IrlRunSettings, of_members, "learn_reward")
         learning = Learning(experiment, parsed.method, parsed.cs_reward, source, parsed.seed)
-        learn_reward(settings, learning, parsed.demonstrations, parsed.output, wanted=parsed.identity)
+        with _stepped_by(parsed.workers):
+            learn_reward(settings, learning, parsed.demonstrations, parsed.output, wanted=parsed.identity)
 
     verb = add_verb(
         verbs,
@@ -141,9 +148,27 @@ def _learn_reward(verbs: Verbs) -> None:
     verb.add_argument(
         "--experiment", choices=EXPERIMENTS, help="default: what the tasks and targets of the demonstrations make it"
     )
+    add_workers(verb)
     add_run_settings(verb)
     add_output(verb)
     add_identity(verb)
+
+
+@contextmanager
+def _stepped_by(workers: int) -> Iterator[None]:
+    """IRL's environments in so many processes.
+
+    They change no byte, so that neither the stage nor what a run is made from has a word for them: they are put in from
+    outside.
+    """
+    from mtcsirl.irl import run
+
+    make_environments = run.make_environments
+    run.make_environments = partial(make_environments, workers=workers)
+    try:
+        yield
+    finally:
+        run.make_environments = make_environments
 
 
 def _transfer(verbs: Verbs) -> None:

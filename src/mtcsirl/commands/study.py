@@ -2,6 +2,9 @@
 
 import argparse
 import json
+import shutil
+import sys
+import time
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -23,6 +26,9 @@ from mtcsirl.study.design import ARTEFACTS, design
 if TYPE_CHECKING:
     from mtcsirl.settings import Settings
     from mtcsirl.study.plan import Rates
+    from mtcsirl.study.status import RunStatus
+
+ALL_DONE = "all runs are done"
 
 
 def register(verbs: Verbs) -> None:
@@ -50,7 +56,26 @@ def register(verbs: Verbs) -> None:
     )
     add_artefact(status)
     status.add_argument("--cores", type=positive, default=2, metavar="N", help="cores for the time left; default 2")
+    status.add_argument(
+        "--watch",
+        type=positive,
+        nargs="?",
+        const=5,
+        metavar="SECONDS",
+        help="again every SECONDS (default 5) until all is done: one screen on a terminal, a line per change in a file",
+    )
     add_study_settings(status)
+
+    target = add_verb(
+        verbs,
+        "target",
+        _target,
+        does="print what to ask snakemake for to make one run: snakemake --cores 1 $(mtcsirl target sac/reach-t0/s0)",
+        needs="nothing",
+        writes="nothing",
+    )
+    target.add_argument("folder", metavar="RUN", help="folder of the run below the results, as mtcsirl status names it")
+    add_study_settings(target)
 
     check = add_verb(
         verbs,
@@ -128,28 +153,78 @@ def _print_artefacts(settings: "Settings", rates: "Rates") -> None:
 
 
 def _status(parsed: argparse.Namespace) -> None:
-    from mtcsirl.study.plan import load_rates
-    from mtcsirl.study.status import FAILED, RUNNING, STALE, STATES, seconds_left, study_status
+    from mtcsirl.study.screen import short
+    from mtcsirl.study.status import study_status
 
     settings = study_settings(parsed)
-    statuses = study_status(design(settings, parsed.target), settings)
+    study, before = design(settings, parsed.target), ""
+    while True:
+        statuses = study_status(study, settings)
+        left = _left(statuses, settings, parsed.cores)
+        if parsed.watch is None:
+            print("\n".join([*_status_lines(statuses), "", left]))
+            return
+        if sys.stdout.isatty():
+            columns, rows = shutil.get_terminal_size()
+            shown = [time.strftime("%H:%M:%S ") + left, *_status_lines(statuses)][: rows - 1]
+            print("\x1b[H\x1b[2J" + "\n".join(short(line, max(columns - 1, 20)) for line in shown), flush=True)
+        elif (counts := _counts(statuses)) != before:
+            print(f"{time.strftime('%H:%M:%S')} {counts}; {left}", flush=True)
+            before = counts
+        if left == ALL_DONE:
+            return
+        time.sleep(parsed.watch)
+
+
+def _left(statuses: "list[RunStatus]", settings: "Settings", cores: int) -> str:
+    from mtcsirl.study.plan import load_rates
+    from mtcsirl.study.status import seconds_left
+
+    left = seconds_left(statuses, settings, load_rates(), cores)
+    return f"time left on {cores} cores: about {left / 3600:.1f} hours" if left else ALL_DONE
+
+
+def _counts(statuses: "list[RunStatus]") -> str:
+    from mtcsirl.study.status import STATES
+
+    states = [status.state for status in statuses]
+    return f"of {len(states)} runs " + ", ".join(f"{states.count(state)} {state}" for state in STATES)
+
+
+def _status_lines(statuses: "list[RunStatus]") -> list[str]:
+    """Stages with their counts, then what runs, failed or is stale, each with what it says."""
+    from mtcsirl.study.status import FAILED, RUNNING, STALE, STATES
+
     lines = []
     for stage in dict.fromkeys(status.run.stage for status in statuses):
         own = [status for status in statuses if status.run.stage == stage]
         gates = [status.passed for status in own if status.passed is not None]
         counts = [sum(status.state == state for status in own) for state in STATES]
         lines.append((stage, *counts, f"{sum(gates)} of {len(gates)}" if gates else ""))
-    _print_table(("stage", *STATES, "gates passed"), lines)
-    for state in (STALE, RUNNING, FAILED):
-        for status in statuses:
-            if status.state == state:
-                print(f"{state}: {status.run.folder}: {status.says}")
-    left = seconds_left(statuses, settings, load_rates(), parsed.cores)
-    print(f"\ntime left on {parsed.cores} cores: about {left / 3600:.1f} hours" if left else "\nall runs are done")
+    said = [
+        f"{state}: {status.run.folder}: {status.says}"
+        for state in (RUNNING, FAILED, STALE)
+        for status in statuses
+        if status.state == state
+    ]
+    return [*_table(("stage", *STATES, "gates passed"), lines), *said]
+
+
+def _target(parsed: argparse.Namespace) -> None:
+    from mtcsirl.files.identity import marker
+    from mtcsirl.study.keys import identity_of
+
+    settings = study_settings(parsed)
+    results = Path(settings.results)
+    folder = Path(parsed.folder)
+    name = (folder.relative_to(results) if folder.is_relative_to(results) else folder).as_posix()
+    runs = {run.folder: run for artefact in (None, *ABLATIONS) for run in design(settings, artefact)}
+    if name not in runs:
+        raise UserError(f"{parsed.folder}: is no run of the study at scale {settings.scale}; see mtcsirl status")
+    print(results / name / marker(identity_of(runs[name], settings).hash))
 
 
 def _verify(parsed: argparse.Namespace) -> None:
-    from mtcsirl.errors import UserError
     from mtcsirl.study.verification import faults
 
     found = list(faults(parsed.folder))
@@ -161,15 +236,18 @@ def _verify(parsed: argparse.Namespace) -> None:
 
 
 def _print_table(head: tuple[str, ...], rows: Sequence[tuple[object, ...]]) -> None:
+    print("\n".join(_table(head, rows)))
+
+
+def _table(head: tuple[str, ...], rows: Sequence[tuple[object, ...]]) -> list[str]:
     """Columns aligned: the first to the left, numbers to the right."""
     texts = [tuple(map(str, row)) for row in (head, *rows)]
     widths = [max(len(row[i]) for row in texts) for i in range(len(head))]
+    lines = []
     for row in texts:
-        first, rest = (
-            row[0].ljust(widths[0]),
-            [text.rjust(width) for text, width in zip(row[1:], widths[1:], strict=True)],
-        )
-        print("  ".join((first, *rest)).rstrip())
+        rest = [text.rjust(width) for text, width in zip(row[1:], widths[1:], strict=True)]
+        lines.append("  ".join((row[0].ljust(widths[0]), *rest)).rstrip())
+    return lines
 
 
 def _deviations(parsed: argparse.Namespace) -> None:

@@ -6,9 +6,10 @@ from pathlib import Path
 from mtcsirl.commands.arguments import (
     Verbs,
     add_artefact,
+    add_device,
     add_study_settings,
     add_verb,
-    natural,
+    add_workers,
     positive,
     study_settings,
 )
@@ -31,8 +32,9 @@ def register(verbs: Verbs) -> None:
     add_artefact(verb)
     verb.add_argument("--stages", nargs="+", choices=AGENT_STAGES, default=AGENT_STAGES, help="default: all three")
     verb.add_argument("--most", type=positive, default=16, metavar="N", help="agents in one batch; default 16")
-    verb.add_argument("--workers", type=natural, default=0, metavar="N", help="processes that step environments")
+    add_workers(verb)
     add_study_settings(verb)
+    add_device(verb)
 
 
 def _run(parsed: argparse.Namespace) -> None:

@@ -3,13 +3,14 @@
 One row per transition, observations in Meta-World's raw units, so that any observation map can be applied later.
 """
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import gymnasium
 import numpy as np
-import pandas as pd
 import torch
 
 from mtcsirl.episodes.evaluation import broken, measure_episode
@@ -20,6 +21,9 @@ from mtcsirl.names import DIVERGED
 from mtcsirl.settings.runs import DemonstrationRunSettings
 from mtcsirl.transitions import Transitions
 from mtcsirl.worlds.environments import ACTION_SIZE, OBSERVATION_MAPS, OBSERVATION_SIZE, make_environment
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 VECTORS = {"observation": OBSERVATION_SIZE, "action": ACTION_SIZE, "next_observation": OBSERVATION_SIZE}
 _STEP = (*VECTORS, "task_reward", "success")
@@ -44,6 +48,8 @@ def collect_demonstrations(
     Raises:
         UserError: an action is not finite; more episodes diverged than are asked for.
     """
+    import pandas as pd
+
     random = np.random.default_rng(seed)
     environment = make_environment(task, target, observation="raw", target_seed=settings.environment.target_seed)
     who = f"policy of {task}-t{target}"

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import ast
 import hashlib
+from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
@@ -18,6 +19,7 @@ PACKAGE = Path(__file__).resolve().parents[1]
 NAME = PACKAGE.name
 
 _Scope = ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef
+_HOLDS_STATEMENTS = ast.stmt | ast.excepthandler | ast.match_case
 
 
 @dataclass(frozen=True)
@@ -83,7 +85,10 @@ def _defined(body: list[ast.stmt]) -> Iterator[tuple[str, ast.stmt]]:
 
 def _imports(tree: ast.AST) -> Iterator[tuple[str, str]]:
     """Local name and dotted target below the package of every import of it."""
-    for node in ast.walk(tree):
+    left = deque([tree])
+    while left:  # breadth first, through statements alone: ten times as many nodes are expressions
+        node = left.popleft()
+        left += [child for child in ast.iter_child_nodes(node) if isinstance(child, _HOLDS_STATEMENTS)]
         if isinstance(node, ast.ImportFrom) and node.module and not node.level:
             package, _, rest = node.module.partition(".")
             if package == NAME:
@@ -178,14 +183,13 @@ def _data_file(node: ast.Call) -> Iterator[str]:
 @cache
 def examine(definition: Definition) -> tuple[str, frozenset[Definition], frozenset[str]]:
     """The hash of a definition, the definitions that it refers to and the data files that it reads."""
-    module = load(definition.module)
-    digest, found, data = _examined(definition.module, module.definitions[definition.name])
+    digest, found, data = _examine(definition.module, load(definition.module).definitions[definition.name])
     return digest, found - {definition}, data
 
 
 @cache
-def _examined(module: str, node: ast.stmt) -> tuple[str, frozenset[Definition], frozenset[str]]:
-    """As `examine`; rewrites the tree, which several names may share, for good."""
+def _examine(module: str, node: ast.stmt) -> tuple[str, frozenset[Definition], frozenset[str]]:
+    """Of a statement, which may define several names; once, since the tree becomes its canonical form."""
     canonical = _Canonical(load(module))
     tree = canonical.visit(node)
     for part in ast.walk(tree):

@@ -20,7 +20,9 @@ from mtcsirl.files.fingerprint import Code, digest
 
 FORMAT = "mtcsirl identity 1"
 FILE = "identity.json"
-NOT_RESULTS = (FILE, "provenance.json", "checkpoint.safetensors")
+NOTE = "archived.json"
+"""Left by an archive in a folder that it restored: which result files it had not kept."""
+NOT_RESULTS = (FILE, NOTE, "provenance.json", "checkpoint.safetensors")
 
 
 @dataclass(frozen=True)
@@ -131,8 +133,39 @@ def verify(path: Path) -> None:
 
 
 def lost(folder: Path, record: Record) -> list[str]:
-    """Result files of a record that are not there."""
-    return [name for name in record.files if not (folder / name).is_file()]
+    """Result files of a record that are not there, but for those that an archive had not kept."""
+    missing = [name for name in record.files if not (folder / name).is_file()]
+    return [name for name in missing if name not in not_kept(folder, record)] if missing else []
+
+
+def note(record: Record, names: Iterable[str]) -> str:
+    """The text of ``archived.json``: of this run an archive has kept all but the result files ``names``."""
+    said = {"identity": record.identity.hash, "bytes": record.bytes, "not_kept": sorted(names)}
+    return json.dumps(said, indent=2, sort_keys=True) + "\n"
+
+
+def not_kept(folder: Path, record: Record) -> frozenset[str]:
+    """Result files of a record that an archive had not kept, as the note in ``folder`` says of these very bytes.
+
+    A note of another run, or an unreadable one, excuses nothing.
+    """
+    try:
+        said = json.loads((folder / NOTE).read_text(encoding="utf-8"))
+        if said["identity"] == record.identity.hash and said["bytes"] == record.bytes:
+            return frozenset(said["not_kept"])
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
+        pass
+    return frozenset()
+
+
+def why_absent(path: Path) -> str:
+    """Why there is no file ``path``, and the way out."""
+    for folder in list(path.parents)[:2]:
+        with suppress(UserError):
+            record = read_record(folder)
+            if record is not None and path.relative_to(folder).as_posix() in not_kept(folder, record):
+                return f"was not archived; delete {folder / NOTE}, and snakemake makes the run again"
+    return "no such file; run the stage that makes it first"
 
 
 # --- markers: a workflow's view of identities ---------------------------------------------------------------------

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
 from mtcsirl.errors import UserError
-from mtcsirl.files.identity import verify
+from mtcsirl.files.identity import verify, why_absent
 from mtcsirl.files.lock import is_locked as is_locked
 from mtcsirl.files.lock import locked as locked
 
@@ -52,7 +52,7 @@ def atomic(path: Path | str, mode: str = "w") -> Iterator[IO[Any]]:
 def _read(path: Path | str, parse: Callable[[Path], Any], what: str) -> Any:
     path = Path(path)
     if not path.is_file():
-        raise UserError(f"{path}: no such file; run the stage that makes it first")
+        raise UserError(f"{path}: {why_absent(path)}")
     verify(path)
     try:
         return parse(path)
@@ -73,6 +73,13 @@ def write_bytes(path: Path | str, data: bytes) -> None:
     """Write a binary file."""
     with atomic(path, "wb") as handle:
         handle.write(data)
+
+
+def restore(path: Path | str, data: bytes) -> None:
+    """Write a file whose reader knows its checksum and refuses half of it: not atomic, and not flushed to disk."""
+    path = Path(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_bytes(data)
 
 
 def read_text(path: Path | str) -> str:

@@ -1,5 +1,7 @@
 """One IRL run from demonstrations to artefacts: reward, generators, curves, diagnostics, evaluation."""
 
+from __future__ import annotations
+
 import dataclasses
 import functools
 import hashlib
@@ -7,10 +9,9 @@ import json
 import logging
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
 
 from mtcsirl.episodes.demonstrations import load_demonstrations
 from mtcsirl.episodes.evaluation import COLUMNS, evaluate, measure_episode
@@ -34,6 +35,9 @@ from mtcsirl.rewards.learned import LearnedReward, save_learned_reward
 from mtcsirl.settings.runs import IrlRunSettings
 from mtcsirl.transitions import Transitions
 from mtcsirl.worlds.environments import OBSERVATION_MAPS
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 CHECKPOINT = "checkpoint.safetensors"
 SAMPLED_ROLLOUTS = 10
@@ -112,6 +116,8 @@ def _train(trainer: IrlTrainer, checkpoint: Path, run: str, stopwatch: Stopwatch
 
 
 def _progress(trainer: IrlTrainer) -> str:
+    import pandas as pd
+
     last = [row for row in trainer.curve if row["step"] == trainer.curve[-1]["step"]]
     means = pd.DataFrame(last).groupby("metric", sort=False)["value"].mean()
     text = ", ".join(f"{metric} {value:.3g}" for metric, value in means.items())
@@ -152,6 +158,8 @@ def _learned(trainer: IrlTrainer, cs_reward: str, about: dict[str, Any]) -> Lear
 
 
 def _write(trainer: IrlTrainer, folder: Path, cs_reward: str, seed: int, about: dict[str, Any]) -> None:
+    import pandas as pd
+
     write_csv(folder / "curve.csv", pd.DataFrame(trainer.curve, columns=list(CURVE_COLUMNS)))
     write_csv(folder / "diagnostics.csv", pd.DataFrame(trainer.diagnostics, columns=list(DIAGNOSTIC_COLUMNS)))
     write_parquet(folder / "samples.parquet", _samples(trainer))
@@ -161,6 +169,8 @@ def _write(trainer: IrlTrainer, folder: Path, cs_reward: str, seed: int, about: 
 
 def _evaluate(trainer: IrlTrainer, folder: Path, cs_reward: str, seed: int) -> None:
     """Save and evaluate each generator; the run passes its gate if every generator does."""
+    import pandas as pd
+
     settings, rows, verdicts = trainer.settings, [], []
     for index, (task, target) in enumerate(trainer.world.members):
         policy = _policy(trainer, index)
@@ -190,6 +200,8 @@ def _policy(trainer: IrlTrainer, index: int) -> Policy:
 
 def _samples(trainer: IrlTrainer) -> pd.DataFrame:
     """The last rollouts of every generator in raw units, columns as in demonstrations (without success)."""
+    import pandas as pd
+
     length = trainer.irl.steps_per_iteration
     steps = min(SAMPLED_ROLLOUTS * length, trainer.replay.size)
     seen = OBSERVATION_MAPS[trainer.settings.environment.observation]

@@ -5,7 +5,10 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from mtcsirl.errors import MissingError
+from mtcsirl.claims.claims import GATE
+from mtcsirl.claims.judging import SHOWN
+from mtcsirl.claims.unit_text import power_text
+from mtcsirl.errors import MissingError, UserError
 from mtcsirl.figures import figure_spec
 from mtcsirl.figures.style import caption_of
 from mtcsirl.files import storage
@@ -18,6 +21,7 @@ from mtcsirl.report.content import (
     StageCost,
     TableView,
     TargetLine,
+    UnitLine,
     WhatWasRun,
 )
 from mtcsirl.report.measured import measured
@@ -44,9 +48,10 @@ def collect(settings: Settings, page: Path, *, partial: bool = False) -> ReportD
         path = _picture_or_table(missing[0][0], settings)
         raise MissingError(f"{path}: not there")
     there = [name for name in ARTEFACTS if name not in dict(missing)]
+    judged = _judged(claims.with_suffix(".json"), partial)
     return ReportData(
         run=_what_was_run(settings, study, provenance),
-        claims=_claims(claims.with_suffix(".json"), partial),
+        claims=claims_of(judged, claims.with_suffix(".json")),
         tables=tuple(_table(name, settings, page) for name in there if name.startswith("table_")),
         figures=tuple(_figure(name, settings, page) for name in there if name.startswith("figure_")),
         gates=_gates(study, results),
@@ -57,6 +62,7 @@ def collect(settings: Settings, page: Path, *, partial: bool = False) -> ReportD
             page, (("every number (JSON)", claims.with_suffix(".json")), ("Markdown", claims.with_suffix(".md")))
         ),
         claims_picture=_optional_picture("claims_picture", "All verdicts", claims.with_suffix(".png")),
+        beforehand=str(judged.get("beforehand", "")),
     )
 
 
@@ -155,16 +161,43 @@ def _distinct(items: Iterator[str]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(items))
 
 
-def _claims(path: Path, partial: bool) -> tuple[Claim, ...]:
-    if partial and not path.is_file():
-        return ()
-    return tuple(_claim(found) for found in storage.read_json(path)["claims"])
+def _judged(path: Path, partial: bool) -> dict[str, Any]:
+    """``claims.json``; empty if there is none yet and ``partial``."""
+    return {"claims": []} if partial and not path.is_file() else storage.read_json(path)
+
+
+def claims_of(judged: dict[str, Any], path: Path | str = "claims.json") -> tuple[Claim, ...]:
+    """The claims of ``claims.json``.
+
+    Raises UserError when they are something else.
+    """
+    try:
+        return tuple(_claim(found) for found in judged["claims"])
+    except (KeyError, TypeError) as error:
+        raise UserError(f"{path}: not the claims of this suite ({error}); delete it and make it again") from error
 
 
 def _claim(found: dict[str, Any]) -> Claim:
-    units = tuple(unit["texts"] for unit in found["units"])
     texts = {name: found[name] for name in ("name", "text", "locus", "criterion", "verdict", "reason")}
-    return Claim(**texts, units=units, measured=measured(found["units"]))
+    return Claim(
+        **texts,
+        units=tuple(map(_unit, found["units"])),
+        measured=measured(found["units"]),
+        gate=found["role"] == GATE,
+        departures=tuple((departure["leans"], departure["text"]) for departure in found["departures"]),
+    )
+
+
+def _unit(found: dict[str, Any]) -> UnitLine:
+    power = "" if found["power"] is None else power_text(found["power"])
+    return UnitLine(
+        texts=found["texts"],
+        state=found["answer"],
+        outcome=found["outcome"],
+        value=found["measure"]["value"],
+        remarks=tuple(filter(None, [power, *found["notes"]])),
+        judged=found["answer"] != SHOWN,
+    )
 
 
 def _gates(study: Runs, results: Path) -> tuple[GateLine, ...]:

@@ -30,10 +30,27 @@ class WhatWasRun:
 
 
 @dataclass(frozen=True)
-class Claim:
-    """One claim with its verdict; ``units`` are what was judged, each with the texts of ``unit_text.COLUMNS``.
+class UnitLine:
+    """One unit of a claim: the texts of ``unit_text.COLUMNS``, its state, what became of its agents, and remarks.
 
-    ``measured``: what the criterion looks at, with its interval, in one line.
+    ``value``: of what the criterion looks at; ``judged``: false of units that stand beside the judged ones for
+    comparison and count nowhere.
+    """
+
+    texts: Mapping[str, str]
+    state: str
+    outcome: str = ""
+    value: float | None = None
+    remarks: tuple[str, ...] = ()
+    judged: bool = True
+
+
+@dataclass(frozen=True)
+class Claim:
+    """One claim with its verdict and units.
+
+    ``measured``: what the criterion looks at, with its interval, in one line; ``gate``: settings were chosen until it
+    passed; ``departures``: (``for`` or ``against``, text) of each way in which this study's settings lean.
     """
 
     name: str
@@ -42,8 +59,15 @@ class Claim:
     criterion: str
     verdict: str
     reason: str
-    units: tuple[Mapping[str, str], ...] = ()
+    units: tuple[UnitLine, ...] = ()
     measured: str = ""
+    gate: bool = False
+    departures: tuple[tuple[str, str], ...] = ()
+
+    @property
+    def judged(self) -> int:
+        """How many units count."""
+        return sum(unit.judged for unit in self.units)
 
 
 @dataclass(frozen=True)
@@ -121,3 +145,5 @@ class ReportData:
     links: tuple[tuple[str, str], ...] = ()
     claims_picture: FigureView | None = None
     """All verdicts on one page, where it has been drawn."""
+    beforehand: str = ""
+    """What was fixed before the runs and what was not."""

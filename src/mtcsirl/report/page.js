@@ -2,7 +2,7 @@
 
 // Tables sort by a click on a heading: up, down, as printed. Lines stay below the heading of their section.
 const key = cell => {
-  const text = cell.textContent.trim();
+  const text = (cell.dataset.sort ?? cell.textContent).trim();
   const found = text.match(/^\[?([-−]?\d[\d,]*(\.\d+)?)/);
   return found ? Number(found[1].replace("−", "-").replaceAll(",", "")) : text === "–" ? Infinity : text;
 };

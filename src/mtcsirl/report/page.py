@@ -1,14 +1,16 @@
 """The start page as one HTML file: styles, pictures and one short script inside, nothing from a network."""
 
 from base64 import b64encode
+from collections.abc import Iterable
 from hashlib import sha256
 from importlib import resources
 
-from jinja2 import Environment, FunctionLoader, StrictUndefined
+from jinja2 import Environment, StrictUndefined
 from markupsafe import Markup
 
+from mtcsirl.claims.judging import BLOCKED, MET, NOT_MET, NOT_RUN, SHOWN, TOO_FEW, UNCLEAR
 from mtcsirl.claims.unit_text import COLUMNS
-from mtcsirl.report.content import FigureView, ReportData
+from mtcsirl.report.content import Claim, FigureView, ReportData
 from mtcsirl.results.notes import Kind, of_kind, scale_notes
 
 VERDICTS = {
@@ -20,6 +22,18 @@ VERDICTS = {
     "not run": "none",
 }
 """Verdict and its style; the words stand beside the colour."""
+STATES = {
+    MET: "good",
+    NOT_MET: "bad",
+    UNCLEAR: "open",
+    TOO_FEW: "open",
+    BLOCKED: "open",
+    NOT_RUN: "none",
+    SHOWN: "none",
+}
+"""The same of a unit's state."""
+FURTHER = ("why", "ours_in_prediction", "paper_in_interval", "difference", "effect")
+"""Texts of a unit that stand in its last column, each under its heading."""
 CONFIGS = {"smoke": "--configfile config/smoke.yaml ", "paper": "--configfile config/paper.yaml "}
 BESIDE: tuple[Kind, ...] = ("scale", "gap", "mark")
 """Notes that are read with a table; remarks are unfolded, and deviations have a section of their own."""
@@ -27,33 +41,35 @@ BESIDE: tuple[Kind, ...] = ("scale", "gap", "mark")
 
 def build_report(data: ReportData) -> str:
     """The page; equal data gives equal text. Every text is escaped."""
-    environment = Environment(
-        loader=FunctionLoader(_file), autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
-    )
+    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
     environment.filters |= {
         "picture": _picture,
         "number": _number,
         "title": _title,
         "duration": _duration,
     }
-    script = _file("page.js")
-    return environment.get_template("page.html").render(
+    # Each name is a constant where its file is read: so the identity of the page knows these files.
+    template = resources.files("mtcsirl.report").joinpath("page.html").read_text(encoding="utf-8")
+    styles = resources.files("mtcsirl.report").joinpath("page.css").read_text(encoding="utf-8")
+    script = resources.files("mtcsirl.report").joinpath("page.js").read_text(encoding="utf-8")
+    return environment.from_string(template).render(
         data=data,
-        css=Markup(_file("page.css")),
+        css=Markup(styles),
         script=Markup(script),
         script_hash=b64encode(sha256(script.encode()).digest()).decode(),
         verdict_style=VERDICTS,
-        verdict_counts=_verdict_counts(data),
+        state_style=STATES,
+        verdict_counts={
+            "Claims": _verdict_counts(claim for claim in data.claims if not claim.gate),
+            "Gates": _verdict_counts(claim for claim in data.claims if claim.gate),
+        },
         unit_columns=COLUMNS,
+        further=FURTHER,
         warnings=scale_notes(data.run.scale),
         beside=lambda notes: of_kind(notes, *BESIDE),
         of_kind=of_kind,
         command=f"snakemake --cores 2 {CONFIGS.get(data.run.scale, '')}",
     )
-
-
-def _file(name: str) -> str:
-    return resources.files("mtcsirl.report").joinpath(name).read_text(encoding="utf-8")
 
 
 def _picture(figure: FigureView) -> str:
@@ -78,6 +94,6 @@ def _title(name: str) -> str:
     return f"{kind.capitalize()} {number.upper()}" if number else kind.capitalize()
 
 
-def _verdict_counts(data: ReportData) -> list[tuple[str, int]]:
-    verdicts = [claim.verdict for claim in data.claims]
+def _verdict_counts(claims: Iterable[Claim]) -> list[tuple[str, int]]:
+    verdicts = [claim.verdict for claim in claims]
     return [(verdict, verdicts.count(verdict)) for verdict in VERDICTS if verdict in verdicts]

@@ -1,38 +1,34 @@
 """The evidence archive: what a third party needs to check every number without training, in parts that are only added.
 
 A part is a folder ``part-0001`` of Parquet files and a manifest with their SHA-256; no part is ever written again. Tidy
-frames (``evaluation``, ``curve``, ``scores``, ``points``, ``diagnostics``) are to be read in pandas, with the run's
-folder in the first column; ``texts`` holds identities, provenance, settings, gates and descriptions as they are, and
-``weights`` the learned rewards and the policies that others were made from. Out of these every kept file comes back
-byte for byte, as the checksums in its run's identity say; what is not kept is named there all the same.
+frames (``evaluation``, ``curve``, ``scores``, ``diagnostics``) are to be read in pandas, with the run's folder in the
+first column; ``texts`` holds identities, provenance, settings, gates and descriptions as they are, ``weights`` the
+learned rewards and some policies, ``points`` the files of scored transitions. Out of these every kept file comes back
+byte for byte, as the checksums in its run's identity say; ``files`` names what is kept and what is not.
 """
 
 from __future__ import annotations
 
-import json
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+import os
+import shutil
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from io import StringIO
+from io import BytesIO
 from pathlib import Path
 
-import numpy as np
 import pandas as pd
 
 from mtcsirl.errors import UserError
 from mtcsirl.files import storage
-from mtcsirl.files.identity import FILE, Record, checksum, digest_of, parse_record
+from mtcsirl.files.identity import FILE, NOTE, Record, digest_of, lost, note, parse_record, read_record, result_files
+from mtcsirl.results.packing import BLOBS, FRAMES, INDEX, TEXTS, Frames, by_folder, kept, packed, unpacked
+from mtcsirl.study.runs import Runs
 
-CSVS = {"evaluation.csv": "evaluation", "curve.csv": "curve", "scores.csv": "scores"}
-"""Kept whole, as tidy frames."""
-THINNED = "diagnostics.csv"
-EVERY = 10
-"""Of an IRL run's diagnostics each so many iterations are kept."""
-WEIGHTS = (".safetensors",)
-NOT_KEPT = ("samples.parquet", "demonstrations.parquet", THINNED)
-"""Files of runs that can only be made again; diagnostics are kept in part."""
 MANIFEST = "manifest.json"
-FRAMES = ("texts", "weights", "points", *CSVS.values(), "diagnostics")
-PROVENANCE = "provenance.json"
+FORMAT = "mtcsirl archive 1"
+AGAIN = "get this part again from where the archive came from"
+LEVEL = 19
+"""Of zstd: a part is written once and read often."""
 
 
 @dataclass(frozen=True)
@@ -42,205 +38,250 @@ class Archived:
     folder: str
     part: str
     record: Record
+    kept: frozenset[str]
+    """Its result files that come back."""
+
+
+@dataclass(frozen=True)
+class Unpacked:
+    """Folders that were restored, and those that were left alone because something is there."""
+
+    restored: tuple[str, ...]
+    left_alone: tuple[str, ...]
+
+
+def policies_kept(study: Runs) -> set[str]:
+    """Folders of the agents whose policies are kept: experts and baselines that a score reads.
+
+    All policies of the study would be three times what a repository can hold; these experts also demonstrated.
+    """
+    return {run.folder for score in study.scores for run in (*score.experts, *score.baselines)}
 
 
 def parts(archive: Path) -> list[Path]:
     """The folders of the archive, in the order in which they were added."""
-    return sorted(path for path in archive.glob("part-*") if path.is_dir())
+    return sorted(path for path in archive.glob(f"part-{'[0-9]' * 4}") if path.is_dir())
 
 
 def archived(archive: Path) -> dict[str, Archived]:
-    """The runs of the archive by their folder; of a run that was added twice, the last."""
-    found: dict[str, Archived] = {}
-    for part in parts(archive):
-        texts = _frame(part, "texts")
-        for folder, text in texts.loc[texts["name"] == FILE, ["folder", "content"]].itertuples(index=False):
-            found[folder] = Archived(folder, part.name, parse_record(text, f"{part}/texts.parquet: {folder}"))
-    return found
-
-
-def add(archive: Path, results: Path, folders: Iterable[str], with_policies: Iterable[str]) -> Path | None:
-    """Add finished runs that the archive lacks as a new part; returns it, or None if there is nothing to add.
-
-    ``with_policies``: folders whose policies are kept too.
+    """The runs of the archive by their folder; of a run that was added twice, the last.
 
     Raises:
-        UserError: a run is not what its record says.
+        UserError: a part is damaged.
     """
-    known, policies = archived(archive), set(with_policies)
+    return {run.folder: run for part in parts(archive) for run in _of_part(part)}
+
+
+def _of_part(part: Path) -> Iterator[Archived]:
+    _check(part)
+    texts, index = _frame(part, TEXTS), _frame(part, INDEX)
+    names = index[index["kept"]].groupby("folder", observed=True)["file"].agg(frozenset)
+    for folder, text in texts.loc[texts["file"] == FILE, ["folder", "content"]].itertuples(index=False):
+        record = parse_record(text, f"{part}: {folder}")
+        yield Archived(folder, part.name, record, names[folder] & frozenset(record.files))
+
+
+def add(archive: Path, results: Path, folders: Iterable[str], with_policies: Collection[str]) -> Path | None:
+    """Add finished runs that the archive lacks as a new part; returns it, or None if there is nothing to add.
+
+    A run that it holds with the same bytes is left out, one that was made again is added again. ``with_policies``:
+    folders whose policies are kept too.
+
+    Raises:
+        UserError: a run is not what its record says, or would not come back byte for byte.
+    """
+    with storage.locked(archive):
+        known = archived(archive)
+        new = [folder for folder in folders if _is_new(known.get(folder), results / folder, folder in with_policies)]
+        if not new:
+            return None
+        number = max((int(part.name.removeprefix("part-")) for part in parts(archive)), default=0) + 1
+        part, draft = archive / f"part-{number:04d}", archive / f".part-{number:04d}"
+        shutil.rmtree(draft, ignore_errors=True)
+        _write(draft, results, new, with_policies)
+        wrong = list(faults_of(draft))
+        if wrong:
+            raise UserError(f"nothing was added: {wrong[0]}")
+        os.rename(draft, part)
+        return part
+
+
+def _is_new(old: Archived | None, source: Path, policies: bool) -> bool:
+    record = _whole(source)
+    if old is None or old.record != record:
+        return True
+    wanted = {name for name in record.files if kept(name, policies) and (source / name).is_file()}
+    return not wanted <= old.kept
+
+
+def _whole(source: Path) -> Record:
+    record = read_record(source)
+    if record is None or lost(source, record):
+        raise UserError(f"{source}: no finished run; add it when it is done")
+    return record
+
+
+def _write(draft: Path, results: Path, folders: Iterable[str], with_policies: Collection[str]) -> None:
     rows: dict[str, list[pd.DataFrame]] = {name: [] for name in FRAMES}
-    added = 0
     for folder in folders:
-        record = parse_record(storage.read_text(results / folder / FILE), str(results / folder / FILE))
-        old = known.get(folder)
-        if old is not None and old.record == record:
-            continue
-        for name, frame in _rows(results / folder, folder, record, folder in policies):
+        for name, frame in packed(results / folder, folder, _whole(results / folder), folder in with_policies):
             rows[name].append(frame)
-        added += 1
-    if not added:
-        return None
-    part = archive / f"part-{len(parts(archive)) + 1:04d}"
     for name, frames in rows.items():
         if frames:
-            _write(part / f"{name}.parquet", pd.concat(frames, ignore_index=True))
-    storage.write_json(part / MANIFEST, {path.name: checksum(path) for path in sorted(part.glob("*.parquet"))})
-    return part
+            frame = pd.concat(frames, ignore_index=True)
+            storage.write_parquet(draft / f"{name}.parquet", frame, level=LEVEL)
+    sums = {path.name: storage.checksum(path) for path in sorted(draft.glob("*.parquet"))}
+    storage.write_json(draft / MANIFEST, {"format": FORMAT, "files": sums})
 
 
-def _rows(source: Path, folder: str, record: Record, policies: bool) -> Iterator[tuple[str, pd.DataFrame]]:
-    """What of one run goes into which frame."""
-    for name in (*record.files, FILE, PROVENANCE):
-        path = source / name
-        if name in CSVS:
-            frame = storage.read_csv(path)
-            if rendered(frame) != path.read_bytes():
-                raise UserError(f"{path}: would not come back byte for byte; it is no file of this suite's")
-            yield CSVS[name], _keyed(frame, folder)
-        elif name == THINNED:
-            yield "diagnostics", _keyed(_thinned(storage.read_csv(path)), folder)
-        elif name == "points.parquet":
-            yield "points", _keyed(storage.read_parquet(path), folder)
-        elif name.endswith(WEIGHTS):
-            if policies or not _is_policy(name):
-                content = [_shuffled(storage.read_bytes(path))]
-                yield "weights", pd.DataFrame({"folder": folder, "name": [name], "content": content})
-        elif name not in NOT_KEPT:
-            yield "texts", pd.DataFrame({"folder": folder, "name": [name], "content": [storage.read_text(path)]})
+def unpack(archive: Path, results: Path, folders: Iterable[str] | None = None) -> Unpacked:
+    """Restore runs (None: all) below ``results``, so that a workflow goes on from them.
 
+    A folder that holds anything is left alone. The note ``archived.json`` in a restored one names what was not kept.
 
-def _is_policy(name: str) -> bool:
-    return name.startswith(("policy.", "policies/"))
-
-
-def _keyed(frame: pd.DataFrame, folder: str) -> pd.DataFrame:
-    frame.insert(0, "folder", folder)
-    return frame
-
-
-def _thinned(frame: pd.DataFrame) -> pd.DataFrame:
-    steps = np.sort(frame["step"].unique())
-    return frame[frame["step"].isin([*steps[EVERY - 1 :: EVERY], *steps[-1:]])]
-
-
-def rendered(frame: pd.DataFrame) -> bytes:
-    """A frame as the bytes that :func:`mtcsirl.files.storage.write_csv` writes."""
-    text = StringIO()
-    storage.render_csv(text, frame)
-    return text.getvalue().encode()
-
-
-def unpack(archive: Path, results: Path, folders: Iterable[str] | None = None) -> int:
-    """Restore runs below ``results``, so that a workflow goes on from them; returns how many.
-
-    A run that is there already is left alone. What was not archived is missing; a job that needs it says so.
+    Raises:
+        UserError: a part is damaged, or a run in it is not what was added.
     """
-    wanted = archived(archive)
-    chosen = [run for folder, run in wanted.items() if folders is None or folder in set(folders)]
-    todo = [run for run in chosen if not (results / run.folder / FILE).is_file()]
+    known = archived(archive)
+    wanted = list(known) if folders is None else [folder for folder in folders if folder in known]
+    free = [folder for folder in wanted if not _taken(results / folder)]
     for part in parts(archive):
-        own = [run for run in todo if run.part == part.name]
-        if own:
-            frames = {name: _frame(part, name) for name in FRAMES if (part / f"{name}.parquet").is_file()}
-            for run in own:
-                _restore(run, results / run.folder, frames)
-    return len(todo)
+        chosen = {folder for folder in free if known[folder].part == part.name}
+        if chosen:
+            rows = by_folder({name: frame[frame["folder"].isin(chosen)] for name, frame in _frames(part).items()})
+            for folder in sorted(chosen):
+                _restore(known[folder], results / folder, rows[folder])
+    return Unpacked(tuple(free), tuple(folder for folder in wanted if folder not in set(free)))
 
 
-def _restore(run: Archived, target: Path, frames: Mapping[str, pd.DataFrame]) -> None:
-    files = kept_files(run.folder, frames)
+def _taken(folder: Path) -> bool:
+    """Whether a folder holds a run or the beginnings of one; a killed ``unpack`` leaves a note and no record."""
+    if (folder / FILE).is_file():
+        return True
+    return not (folder / NOTE).is_file() and (bool(result_files(folder)) or any(folder.glob("checkpoint*")))
+
+
+def _restore(run: Archived, target: Path, own: Frames) -> None:
+    """The note first and the record last, so that whatever is between them is known to be unfinished."""
+    files = _files(own)
+    wrong = list(_faults_of_run(run.folder, own, files))
+    if wrong:
+        raise UserError(f"{run.part}: {wrong[0]}")
     last = files.pop(FILE)
-    for name, content in files.items():
-        storage.write_bytes(target / name, content)
-    storage.write_bytes(target / FILE, last)
-
-
-def kept_files(folder: str, frames: Mapping[str, pd.DataFrame]) -> dict[str, bytes]:
-    """Every kept file of one run, by name."""
-
-    def own(name: str) -> pd.DataFrame:
-        frame = frames.get(name)
-        return pd.DataFrame() if frame is None else frame[frame["folder"] == folder].drop(columns="folder")
-
-    files = {str(row.name): str(row.content).encode() for row in own("texts").itertuples(index=False, name="Row")}
-    files |= {str(row.name): _unshuffled(bytes(row.content)) for row in own("weights").itertuples(name="Row")}  # type: ignore[arg-type]
-    for file, name in CSVS.items():
-        frame = own(name)
-        if len(frame):
-            files[file] = rendered(frame.dropna(axis=1, how="all") if name != "scores" else frame)
-    return files
+    with storage.locked(target):
+        storage.write_text(target / NOTE, note(run.record, set(run.record.files) - set(files)))
+        for name, content in files.items():
+            storage.restore(target / name, content)
+        storage.restore(target / FILE, last)
 
 
 def verify(archive: Path) -> list[str]:
-    """What is wrong with the archive, one line each: checksums of parts, identities, bytes of every kept file."""
-    wrong: list[str] = []
-    for part in parts(archive):
-        wrong += [f"{part / name}: {why}" for name, why in _faults(part)]
-    if wrong:
-        return wrong
-    for part in parts(archive):
-        frames = {name: _frame(part, name) for name in FRAMES if (part / f"{name}.parquet").is_file()}
-        for run in archived(archive).values():
-            if run.part == part.name:
-                found = {name: digest_of(content) for name, content in kept_files(run.folder, frames).items()}
-                differ = [name for name, sha in run.record.files.items() if name in found and found[name] != sha]
-                wrong += [f"{part}: {run.folder}/{name} is not what its run wrote" for name in differ]
+    """What is wrong with the archive, one line each: parts, checksums, identities, bytes of every kept file."""
+    found = parts(archive)
+    names = [f"part-{number + 1:04d}" for number in range(len(found))]
+    wrong = [f"{archive / name}: lost, or not a part" for name in names if not (archive / name).is_dir()]
+    for part in found:
+        wrong += faults_of(part)
     return wrong
 
 
-def _faults(part: Path) -> Iterator[tuple[str, str]]:
-    said = storage.read_json(part / MANIFEST) if (part / MANIFEST).is_file() else None
-    if not isinstance(said, dict):
-        yield MANIFEST, "missing or unreadable"
+def faults_of(part: Path) -> Iterator[str]:
+    """What is wrong with one part."""
+    try:
+        _check(part)
+        rows = by_folder(_frames(part))
+    except UserError as error:
+        yield str(error)
         return
-    for name in sorted({*said, *(path.name for path in part.glob("*.parquet"))}):
-        path = part / name
-        if name not in said:
-            yield name, "not in the manifest"
-        elif not path.is_file():
-            yield name, "lost"
-        elif checksum(path) != said[name]:
-            yield name, "changed since it was added"
+    for folder, own in rows.items():
+        for fault in _faults_of_run(folder, own, _files(own)):
+            yield f"{part}: {fault}"
+
+
+def _files(own: Frames) -> dict[str, bytes]:
+    """The kept files of a run; none where its rows are no archive's."""
+    try:
+        return unpacked(own)
+    except (KeyError, ValueError, TypeError, AttributeError):
+        return {}
+
+
+def _faults_of_run(folder: str, own: Frames, files: Mapping[str, bytes]) -> Iterator[str]:
+    """What of one run differs from its record and its index."""
+    try:
+        record = parse_record(files[FILE].decode(), folder)
+        index = own[INDEX].set_index("file")
+    except (KeyError, ValueError, UserError) as error:
+        yield f"{folder}: no rows of an archive ({error})"
+        return
+    for name in sorted({*index.index, *record.files, *files}):
+        if name not in index.index:
+            yield f"{folder}/{name}: not in {INDEX}"
+        elif name in record.files and record.files[name] != index.at[name, "sha256"]:
+            yield f"{folder}/{name}: another checksum than in its identity"
+        elif index.at[name, "kept"] and (name not in files or digest_of(files[name]) != index.at[name, "sha256"]):
+            yield f"{folder}/{name}: is not what its run wrote"
 
 
 def read(archive: Path, name: str) -> pd.DataFrame:
-    """One tidy frame over all parts, the last version of each run: ``evaluation``, ``curve``, ``scores``, ..."""
-    latest = archived(archive)
+    """One frame over all parts, the last version of each run: ``evaluation``, ``curve``, ``scores``, ``points``, ...
+
+    Raises:
+        UserError: there is no such frame, or a part is damaged.
+    """
+    if name not in FRAMES:
+        raise UserError(f"no frame {name!r} in the archive; it has {', '.join(FRAMES)}")
+    latest = {folder: run.part for folder, run in archived(archive).items()}
     frames = []
     for part in parts(archive):
         if (part / f"{name}.parquet").is_file():
             frame = _frame(part, name)
-            frames.append(frame[[latest[folder].part == part.name for folder in frame["folder"]]])
+            frames.append(frame[frame["folder"].map(latest) == part.name])
+    if name == BLOBS:
+        frames = [_points(*row) for frame in frames for row in frame[["folder", "content"]].itertuples(index=False)]
     return pd.concat(frames, ignore_index=True) if frames else pd.DataFrame()
+
+
+def _points(folder: str, content: bytes) -> pd.DataFrame:
+    frame = pd.read_parquet(BytesIO(content))
+    frame.insert(0, "folder", folder)
+    return frame
+
+
+def _frames(part: Path) -> dict[str, pd.DataFrame]:
+    return {name: _frame(part, name) for name in FRAMES if (part / f"{name}.parquet").is_file()}
 
 
 def _frame(part: Path, name: str) -> pd.DataFrame:
     return storage.read_parquet(part / f"{name}.parquet")
 
 
-def _write(path: Path, frame: pd.DataFrame) -> None:
-    storage.write_parquet(path, frame, level=15)
+def _check(part: Path) -> None:
+    """Hold every file of a part against its manifest.
+
+    Raises:
+        UserError: one was changed, lost or put there.
+    """
+    said = storage.read_json(part / MANIFEST)
+    if not isinstance(said, dict) or said.get("format") != FORMAT or not isinstance(said.get("files"), dict):
+        raise UserError(f"{part / MANIFEST}: not the manifest of an archive; {AGAIN}")
+    sums = said["files"]
+    for name in sorted({*sums, *(path.name for path in part.iterdir())} - {MANIFEST}):
+        path = part / name
+        if name not in sums or Path(name).name != name or name.removesuffix(".parquet") not in FRAMES:
+            raise UserError(f"{path}: no file of the archive, by its {MANIFEST}; {AGAIN}")
+        if not path.is_file():
+            raise UserError(f"{path}: lost; {AGAIN}")
+        if storage.checksum(path) != sums[name]:
+            raise UserError(f"{path}: changed since it was added; {AGAIN}")
 
 
-def _shuffled(content: bytes) -> bytes:
-    """Bytes 0, 4, 8, ... first: exponents of neighbouring floats are alike and compress."""
-    return b"".join(content[start::4] for start in range(4))
-
-
-def _unshuffled(content: bytes) -> bytes:
-    whole = bytearray(len(content))
-    sizes: Sequence[int] = [len(range(start, len(content), 4)) for start in range(4)]
-    begin = 0
-    for start, size in enumerate(sizes):
-        whole[start::4] = content[begin : begin + size]
-        begin += size
-    return bytes(whole)
-
-
-def summary(archive: Path) -> str:
-    """How much there is, for people."""
-    size = sum(path.stat().st_size for path in archive.rglob("*") if path.is_file())
-    counts: dict[str, int] = {}
-    for run in archived(archive).values():
-        counts[run.record.identity.stage] = counts.get(run.record.identity.stage, 0) + 1
-    return json.dumps({"parts": len(parts(archive)), "MiB": round(size / 2**20, 1), "runs": counts})
+def summary(archive: Path) -> list[tuple[str, int, float]]:
+    """How much there is: (what, files or runs, MiB) of every stage, frame and part."""
+    runs = archived(archive).values()
+    stages = [run.record.identity.stage for run in runs]
+    rows = [(stage, stages.count(stage), 0.0) for stage in dict.fromkeys(stages)]
+    for name in (*(f"{frame}.parquet" for frame in FRAMES), MANIFEST):
+        files = list(archive.glob(f"part-*/{name}"))
+        rows.append((name, len(files), sum(file.stat().st_size for file in files) / 2**20))
+    return rows

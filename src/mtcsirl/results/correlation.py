@@ -14,7 +14,6 @@ from typing import NamedTuple
 
 import numpy as np
 import torch
-from scipy.stats import rankdata
 
 from mtcsirl.results.statistics import Array, Estimate, cluster_bootstrap
 from mtcsirl.transitions import RewardFunction, Transitions
@@ -36,6 +35,8 @@ def pearson(x: Array, y: Array) -> float:
 
 def spearman(x: Array, y: Array) -> float:
     """Spearman's rank correlation of two vectors; NaN if one of them does not vary."""
+    from scipy.stats import rankdata
+
     return pearson(rankdata(x), rankdata(y))
 
 

@@ -4,12 +4,13 @@ Every correlation says on which transitions it was taken: the same reward can co
 not at all on the expert's transitions, where there is nothing to explain.
 """
 
+from __future__ import annotations
+
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple, cast
+from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 import numpy as np
-import pandas as pd
 import torch
 
 from mtcsirl.episodes.demonstrations import VECTORS, as_transitions, collect_demonstrations, whole_episodes
@@ -25,6 +26,9 @@ from mtcsirl.rewards.networks import RewardNetwork
 from mtcsirl.settings.runs import DemonstrationRunSettings, ScoreRunSettings
 from mtcsirl.transitions import RewardFunction, Transitions
 from mtcsirl.worlds.environments import ACTION_SIZE, EPISODE_STEPS
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 EPIC_TRANSITIONS = 256
 KEY = ("experiment", "method", "cs_reward", "source", "task", "target", "seed")
@@ -42,7 +46,7 @@ class TransitionSet(NamedTuple):
     agent: np.ndarray
     episode: np.ndarray
 
-    def part(self, rows: np.ndarray) -> "TransitionSet":
+    def part(self, rows: np.ndarray) -> TransitionSet:
         """The transitions that ``rows`` [N] of truth values or positions pick."""
         index = torch.from_numpy(np.flatnonzero(rows) if rows.dtype == bool else rows)
         fields = Transitions(*(field[index] for field in self.transitions))
@@ -86,6 +90,8 @@ def score(
         UserError: a file is missing or damaged; the learned reward is of another cs-reward or observation; a policy is
             of another task, target or cs-reward, or was given twice.
     """
+    import pandas as pd
+
     learned = load_learned_reward(reward)
     check_learned(learned, reward, cs_reward=cs_reward, observation=settings.environment.observation)
     truth = ground_truth(cs_reward, settings.environment.observation)
@@ -205,6 +211,8 @@ def _generators(reward: Path, cs_reward: str, settings: ScoreRunSettings) -> Tra
 
 def last_episodes(frame: pd.DataFrame, count: int, observation: str) -> TransitionSet:
     """The last whole episodes of every task and target of ``samples.parquet``, about ``count`` transitions in all."""
+    import pandas as pd
+
     sizes = frame.groupby(["task", "target", "episode"], sort=True).size()
     sizes = sizes[sizes == sizes.max()]
     per_member = max(1, count // int(sizes.iloc[0] * len(sizes.groupby(["task", "target"]))))
@@ -223,6 +231,8 @@ def together(sets: Sequence[TransitionSet]) -> TransitionSet:
 
 def _thinned(one: TransitionSet, count: int) -> TransitionSet:
     """About ``count`` transitions: the first episode of every agent, then the second of every one, and so on."""
+    import pandas as pd
+
     episodes = pd.DataFrame({"agent": one.agent, "episode": one.episode})
     sizes = episodes.groupby(["agent", "episode"], sort=True).size().reset_index(name="steps")
     turn = sizes.groupby("agent").cumcount()
@@ -255,6 +265,8 @@ def _points(
     name: str, chosen: TransitionSet, functions: dict[str, RewardFunction], settings: ScoreRunSettings
 ) -> pd.DataFrame:
     """Evenly spaced transitions of a set; what is removed from the rests was fitted to the whole set."""
+    import pandas as pd
+
     columns = nuisance(chosen.transitions, settings.discount)
     found = {which: _numpy(functions[which], chosen.transitions) for which in ("truth", "learned", "random")}
     found |= {f"{which}_rest": remove(found[which], columns) for which in ("truth", "learned")}

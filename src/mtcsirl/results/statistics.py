@@ -11,9 +11,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy import stats
-from scipy.optimize import brentq
-from scipy.special import ndtr
 
 Array = NDArray[np.float64]
 
@@ -95,6 +92,8 @@ def contrast(*terms: tuple[float, Summary], constant: float = 0.0, confidence: f
     v_i = (w_i s_i)^2 / n_i; the error is sqrt(sum v_i) with (sum v_i)^2 / sum(v_i^2 / (n_i - 1)) degrees of freedom,
     after Welch and Satterthwaite. Without any spread the interval is the value itself.
     """
+    from scipy import stats
+
     value = constant + sum(weight * summary.mean for weight, summary in terms)
     if any(summary.n < 2 for _, summary in terms):
         return Welch(value, np.nan, np.nan, np.nan, np.nan, np.nan)
@@ -240,12 +239,16 @@ def _percentiles(draws: Sequence[float], confidence: float) -> Interval:
 
 
 def _t(confidence: float, degrees: float) -> float:
+    from scipy import stats
+
     return float(stats.t.ppf((1 + confidence) / 2, degrees))
 
 
 @cache
 def _chi_nodes(degrees: int) -> tuple[Array, Array]:
     """sqrt(q(u) / k) at the nodes u in [0, 1] of Gauss and Legendre, and the weights (they sum to 2)."""
+    from scipy import stats
+
     nodes, weights = np.polynomial.legendre.leggauss(300)
     return np.sqrt(stats.chi2.ppf((nodes + 1) / 2, degrees) / degrees), weights
 
@@ -256,6 +259,9 @@ def _noncentrality(t: float, degrees: int, confidence: float) -> Interval:
     P(T <= t | c) = integral over u in [0, 1] of Phi(t sqrt(q(u) / k) - c), q the quantile function of chi-squared with
     k degrees of freedom; Gauss-Legendre, since scipy's noncentral t has no numbers in its far tails.
     """
+    from scipy.optimize import brentq
+    from scipy.special import ndtr
+
     root, weights = _chi_nodes(degrees)
     scaled = t * root
 

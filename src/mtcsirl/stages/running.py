@@ -13,6 +13,7 @@ from mtcsirl.errors import UserError
 from mtcsirl.files import storage
 from mtcsirl.files.identity import (
     FILE,
+    NOTE,
     Identity,
     Record,
     checksums,
@@ -107,6 +108,7 @@ def finished(task: Task) -> bool:
 def begin(task: Task) -> None:
     """Take the signature off what will be overwritten."""
     storage.remove(task.output / FILE)
+    storage.remove(task.output / NOTE)
     write_marker(task.output, None)
 
 

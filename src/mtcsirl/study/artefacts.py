@@ -6,6 +6,7 @@ Artefacts lie side by side in a few folders, so the record of each stands in a f
 
 import os
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from pathlib import Path
 
 from mtcsirl.errors import UserError
@@ -28,11 +29,14 @@ from mtcsirl.study.code import artefact_code
 from mtcsirl.study.design import ARTEFACTS, CLAIMS, design
 from mtcsirl.study.keys import identity_of
 from mtcsirl.study.standing import ABSENT, DONE, INCOMPLETE, STALE, Standing
+from mtcsirl.worlds.drawable import lacking
 
 PLACES = {"results", "figures", "extensions"}
 """Keys that say where things are, not what they are."""
 DRAWN_FROM = {"scale", "single_target", "multi_target", "multi_task", "environment"}
 """Keys that a figure which is drawn from no run depends on."""
+RENDERED = ("figure_8", "figure_9")
+"""Figures that show MuJoCo scenes; where a machine cannot draw these, words stand in their place."""
 HEAT_MAPS = {"table_1": "action_norm", "table_3": "velocity"}
 """Tables that are also drawn, beside the paper's, and their cs-reward."""
 OTHERS: Mapping[str, tuple[str, ...]] = {
@@ -68,7 +72,25 @@ def artefact_identity(name: str, settings: Settings) -> Identity:
     said = {key: value for key, value in identifying(settings).items() if key not in PLACES}
     if name.startswith("figure_") and not inputs:
         said = {key: value for key, value in said.items() if key in DRAWN_FROM}
-    return Identity(name, {}, said, artefact_code(*modules_of(name)), inputs)
+    drawn = Identity(name, {}, said, artefact_code(*modules_of(name)), inputs)
+    if name not in RENDERED or lacking() is None or _is_there(drawn, settings):
+        return drawn
+    return replace(drawn, settings=said | {"rendered": "no"})
+
+
+def not_rendered(name: str, settings: Settings) -> str | None:
+    """Why words stand in place of the artefact ``name``; None where it is drawn, or a picture of today is there."""
+    return lacking() if artefact_identity(name, settings).settings.get("rendered") == "no" else None
+
+
+def _is_there(drawn: Identity, settings: Settings) -> bool:
+    """A picture that another machine drew stays."""
+    folder = record_folder(drawn.stage, settings.results)
+    try:
+        record = read_record(folder)
+    except UserError:
+        return False
+    return record is not None and record.identity.hash == drawn.hash and not lost(folder, record)
 
 
 def record_folder(name: str, results: Path | str) -> Path:

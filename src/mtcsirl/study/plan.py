@@ -29,7 +29,7 @@ from mtcsirl.study.memory import (
     score_memory,
     weights,
 )
-from mtcsirl.study.runs import AnyRun, Baseline, Demonstrations, Expert, IrlRun, Runs, Score, Transfer
+from mtcsirl.study.runs import AnyRun, Baseline, Demonstrations, Expert, IrlRun, Score, Transfer
 
 CALIBRATION = Path(__file__).with_name("calibration.json")
 MEASURED_HIDDEN = {"sac": (256, 256), "f": (128, 128)}
@@ -209,7 +209,7 @@ def request(run: AnyRun, settings: Settings, rates: Rates, attempt: int = 1) -> 
     own, more = cost(run, settings, rates), 1.5 ** (attempt - 1)
     minutes = OTHER_MACHINES * rates.slowdown * own.seconds / 60
     megabytes = MEMORY_MARGIN * own.memory_mib * 2**20 / 1e6
-    return Request(ceil(megabytes * more), LEAST_MINUTES + ceil(minutes * more))
+    return Request(ceil(megabytes * more), ceil((LEAST_MINUTES + minutes) * more))
 
 
 @dataclass(frozen=True)
@@ -224,8 +224,8 @@ class StagePlan:
     disk_gib: float
 
 
-def plan(study: Runs, settings: Settings, rates: Rates) -> list[StagePlan]:
-    """One line per stage, in the DAG's order; core-hours are of cores that are all busy."""
+def plan(study: Iterable[AnyRun], settings: Settings, rates: Rates) -> list[StagePlan]:
+    """One line per stage of the runs, in the DAG's order; core-hours are of cores that are all busy."""
     costs: dict[str, list[Cost]] = {}
     for run in study:
         costs.setdefault(run.stage, []).append(cost(run, settings, rates))

@@ -1,6 +1,7 @@
 """How far a study is, read from its results folder while it runs or after: `mtcsirl status`."""
 
 import time
+from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,6 +12,7 @@ from mtcsirl.study.keys import identity_of
 from mtcsirl.study.outputs import OUTPUTS
 from mtcsirl.study.plan import Rates, cost
 from mtcsirl.study.runs import AnyRun, Runs
+from mtcsirl.study.screen import last_lines, short
 from mtcsirl.study.standing import DONE, INCOMPLETE, STALE, standing
 
 RUNNING, FAILED, WAITING = "running", "failed", "waiting"
@@ -18,6 +20,9 @@ STATES = (DONE, STALE, RUNNING, FAILED, WAITING)
 """Stale: its number could differ today. Failed: was started, does not run and left no complete result."""
 STARTING_SECONDS = 15
 """A log this young without a lock is a job that still imports its libraries."""
+
+TOP = 2
+"""Reasons that :func:`before_it_starts` names."""
 
 
 @dataclass(frozen=True)
@@ -53,6 +58,19 @@ def run_status(run: AnyRun, settings: Settings) -> RunStatus:
     return RunStatus(run, STALE if found.state == STALE else WAITING, says="; ".join(found.why))
 
 
+def before_it_starts(study: Runs, settings: Settings) -> str:
+    """One line: how many runs are done, stale and why, or half there, before a workflow starts."""
+    found = [standing(run, settings) for run in study]
+    counts = Counter(one.state for one in found)
+    said = [f"{counts[DONE]} done"] + [f"{counts[state]} {state}" for state in (STALE, INCOMPLETE) if counts[state]]
+    # what follows from another run's change is no reason of its own, unless it is the only one
+    reasons = [one.why for one in found if one.state == STALE]
+    own = [[why for why in whys if not why.startswith("input ")] or ["an input is another"] for whys in reasons]
+    top = Counter(short(why, 60) for whys in own for why in whys).most_common(TOP)
+    because = f" ({'; '.join(f'{count} x {why}' for why, count in top)})" if top else ""
+    return f"{settings.results}: of {len(found)} runs {', '.join(said)}{because}"
+
+
 def seconds_left(statuses: list[RunStatus], settings: Settings, rates: Rates, cores: int) -> float:
     """Wall seconds for what is not done: the mean of the stage's done runs, or the plan's estimate before any is."""
     took: dict[str, list[float]] = {}
@@ -77,5 +95,4 @@ def _finished(run: AnyRun, folder: Path) -> RunStatus:
 
 
 def _last_line(log: Path) -> str:
-    lines = log.read_text(encoding="utf-8", errors="replace").split("\n") if log.is_file() else []
-    return next((line.strip() for line in reversed(lines) if line.strip()), "")
+    return next(iter(last_lines(log, 1)), "")

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from mtcsirl.errors import UserError
-from mtcsirl.files.identity import FILE, NOT_RESULTS, Record, checksum, read_record, result_files
+from mtcsirl.files.identity import FILE, NOT_RESULTS, Record, checksum, lost, read_record, result_files
 
 KEPT_APART = ("logs", "artefacts", ".snakemake")
 """Folders below the results that hold no runs."""
@@ -53,11 +53,11 @@ def _of_folder(folder: Path) -> Iterator[Fault]:
 
 
 def _changed(folder: Path, record: Record) -> Iterator[Fault]:
+    for name in lost(folder, record):
+        yield Fault(folder, f"lost {name}")
     for name, wanted in record.files.items():
         path = folder / name
-        if not path.is_file():
-            yield Fault(folder, f"lost {name}")
-        elif checksum(path) != wanted:
+        if path.is_file() and checksum(path) != wanted:
             yield Fault(folder, f"{name} changed since its run wrote it")
 
 
