@@ -22,7 +22,7 @@ from mtcsirl.settings.runs import AgentRunSettings, expert_run
 from mtcsirl.study.design import design
 from mtcsirl.study.keys import identity_of
 from mtcsirl.study.outputs import OUTPUTS
-from mtcsirl.study.plan import Rates, cost, load_rates, plan, wall_hours
+from mtcsirl.study.plan import CALIBRATION, Rates, cost, load_rates, plan, wall_hours
 from mtcsirl.study.runs import Expert
 from mtcsirl.study.status import DONE, FAILED, RUNNING, STALE, WAITING, run_status, seconds_left, study_status
 
@@ -210,6 +210,35 @@ def test_larger_networks_cost_more(rates: Rates, change: str) -> None:
     )
     assert larger[stage] > 1.05 * usual[stage]
     assert (larger["transfer"] > 1.2 * usual["transfer"]) == change.startswith("sac.")
+
+
+WRONG = {
+    "": "not a readable JSON file",
+    "[]": "holds no rates",
+    "{}": "lacks machine, start_up, ",
+    "start_up: 0": "start_up = 0: must be greater than 0",
+    "start_up: -1": "start_up = -1: must be greater than 0",
+    "start_up: NaN": "start_up = nan: must be a finite number",
+    "start_up: Infinity": "start_up = inf: must be a finite number",
+    "sac_update: {}": "sac_update: must not be empty",
+    'sac_update: {"64": 0}': "sac_update.64 = 0: must be greater than 0",
+    "slowdown: 0.5": "slowdown = 0.5: must be greater than or equal to 1",
+    'environment_step: {"reach": 1}': "environment_step: must have a rate named default",
+}
+
+
+@pytest.mark.parametrize("wrong", WRONG)
+def test_rates_that_cannot_be_are_refused_in_one_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], wrong: str
+) -> None:
+    file = tmp_path / "rates.json"
+    key, colon, value = wrong.partition(": ")
+    rates = json.loads(CALIBRATION.read_text())
+    file.write_text(json.dumps(rates | {key: json.loads(value)}) if colon else wrong)
+    assert cli.main(["plan", "--target", "table_2", "--rates", str(file)]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert str(file) in line
+    assert WRONG[wrong] in line
 
 
 def test_the_shipped_rates_are_measured() -> None:

@@ -5,8 +5,10 @@ leaves a marker with the hash of that identity in its name, asks for the markers
 `ancient`: neither the time of a file nor Snakemake's own records count.
 """
 
+import gc
 import os
 import sys
+from functools import cache
 from pathlib import Path
 
 from snakemake.exceptions import WorkflowError
@@ -23,12 +25,14 @@ from mtcsirl.study.ablations import ABLATIONS
 from mtcsirl.study.artefacts import HEAT_MAPS, settle_artefacts
 from mtcsirl.study.design import ARTEFACTS, CLAIMS, design
 from mtcsirl.study.keys import FIELDS
-from mtcsirl.study.plan import load_rates, plan
+from mtcsirl.study.plan import load_rates, plan, request
 from mtcsirl.study.runs import Baseline, Demonstrations, Expert, IrlRun, Score, Transfer
 from mtcsirl.study.screen import EXPECTED
 from mtcsirl.study.standing import settle
 from mtcsirl.study.status import before_it_starts
 from mtcsirl.worlds import drawable
+
+gc.set_threshold(100_000)  # a DAG is many objects that all stay: looking for garbage takes a fifth of building it
 
 try:
     for file in workflow.configfiles if workflow.is_main_process else ():
@@ -44,6 +48,7 @@ RUNS = {run.folder: run for name in (None, *ABLATIONS) for run in design(SETTING
 MADE = settle(RUNS.values(), SETTINGS)
 PAGES = [*ARTEFACTS, CLAIMS, *ABLATIONS, "report", "reward_quality", "diagnostics", "validation"]
 MADE_PAGES = settle_artefacts(PAGES, SETTINGS)
+RATES = load_rates()
 RESULTS = SETTINGS.results
 # plain `snakemake` of a virtual environment that is not activated finds `mtcsirl` beside itself
 os.environ["PATH"] = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
@@ -68,7 +73,7 @@ pathvars:
 onstart:
     if workflow.is_main_process:
         logger.info(before_it_starts(STUDY, SETTINGS))
-        EXPECTED.update((s.stage, 3600 * s.core_hours / s.jobs) for s in plan(STUDY, SETTINGS, load_rates()))
+        EXPECTED.update((s.stage, 3600 * s.core_hours / s.jobs) for s in plan(STUDY, SETTINGS, RATES))
 
 
 wildcard_constraints:
@@ -101,7 +106,29 @@ def run_of(kind, wildcards):
 
 def settings_of(kind):
     """The settings that a run depends on, as JSON."""
-    return lambda wildcards: as_json(run_of(kind, wildcards).settings(SETTINGS))
+    return lambda wildcards: settings_text(run_of(kind, wildcards))
+
+
+@cache
+def settings_text(run):
+    """Asked for several times per job."""
+    return as_json(run.settings(SETTINGS))
+
+
+@cache
+def asked(run, attempt):
+    """What a run asks a cluster for on its first, second, ... try."""
+    return request(run, SETTINGS, RATES, attempt)
+
+
+def memory_of(kind):
+    """The memory of a run as planned, with a margin and more on a retry."""
+    return lambda wildcards, attempt: asked(run_of(kind, wildcards), attempt).mem_mb
+
+
+def minutes_of(kind):
+    """The minutes that a run may take, likewise."""
+    return lambda wildcards, attempt: asked(run_of(kind, wildcards), attempt).minutes
 
 
 def markers(runs):

@@ -11,7 +11,8 @@ rule collect_demonstrations:
         log_of(Demonstrations),
     threads: 1
     resources:
-        mem_mb=1200,
+        mem_mb=memory_of(Demonstrations),
+        runtime=minutes_of(Demonstrations),
     params:
         settings=settings_of(Demonstrations),
         expert=folders_of(Demonstrations, "expert"),

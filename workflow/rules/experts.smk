@@ -9,7 +9,8 @@ rule train_expert:
         log_of(Expert),
     threads: 1
     resources:
-        mem_mb=1200,
+        mem_mb=memory_of(Expert),
+        runtime=minutes_of(Expert),
     params:
         settings=settings_of(Expert),
         folder=subpath(output[0], parent=True),
@@ -27,7 +28,8 @@ rule train_sac:
         log_of(Baseline),
     threads: 1
     resources:
-        mem_mb=1200,
+        mem_mb=memory_of(Baseline),
+        runtime=minutes_of(Baseline),
     params:
         settings=settings_of(Baseline),
         folder=subpath(output[0], parent=True),

@@ -16,7 +16,8 @@ rule learn_reward:
         log_of(IrlRun),
     threads: 1
     resources:
-        mem_mb=1200,
+        mem_mb=memory_of(IrlRun),
+        runtime=minutes_of(IrlRun),
     params:
         settings=settings_of(IrlRun),
         demonstrations=demonstrations_of,
@@ -38,7 +39,8 @@ rule score_reward:
         log_of(Score),
     threads: 1
     resources:
-        mem_mb=1200,
+        mem_mb=memory_of(Score),
+        runtime=minutes_of(Score),
     params:
         settings=settings_of(Score),
         reward=folders_of(Score, "reward"),

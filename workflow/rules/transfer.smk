@@ -11,7 +11,8 @@ rule transfer:
         log_of(Transfer),
     threads: 1
     resources:
-        mem_mb=1200,
+        mem_mb=memory_of(Transfer),
+        runtime=minutes_of(Transfer),
     params:
         settings=settings_of(Transfer),
         task_reward=lambda wildcards: run_of(Transfer, wildcards).task_reward,

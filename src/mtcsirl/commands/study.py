@@ -204,5 +204,6 @@ def _calibrate(parsed: argparse.Namespace) -> None:
     from mtcsirl.files.storage import write_json
     from mtcsirl.study.calibration import calibrate
 
-    write_json(parsed.output, calibrate().model_dump(mode="json"))
-    print(parsed.output)
+    rates = calibrate()
+    write_json(parsed.output, rates.model_dump(mode="json"))
+    print(f"{parsed.output}: rates of {rates.machine}")

@@ -70,7 +70,8 @@ def logged(words: Sequence[str]) -> Iterator[None]:
     """Where both streams go into one file ``NAME.log``, begin with a line about this try and keep the file.
 
     Snakemake removes the log of an earlier try before it starts the next. So a try that has not ended well stays as
-    ``NAME.1.log``, ``NAME.2.log``, ... beside it: another name of the same file, which costs nothing.
+    ``NAME.1.log``, ``NAME.2.log``, ... beside it: another name of the same file, which costs nothing. So does that of
+    an orphan whose ``NAME.log`` is a later try's by now.
     """
     log = _log_file()
     if log is None:
@@ -81,7 +82,8 @@ def logged(words: Sequence[str]) -> Iterator[None]:
     yield
     if kept is not None:
         with suppress(OSError):
-            kept.unlink()
+            if kept.samefile(log):
+                kept.unlink()
 
 
 def _short(text: str, most: int = 300) -> str:

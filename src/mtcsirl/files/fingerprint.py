@@ -76,6 +76,7 @@ def _named(found: set[Definition]) -> Code:
     return named
 
 
+@cache
 def _data_hash(name: str) -> str:
     """YAML by what it says, so that comments do not count; other files by their bytes."""
     content = (PACKAGE / name).read_bytes()

@@ -5,6 +5,7 @@ for a single run is told so. A test trains every kind of run and holds this list
 """
 
 from collections.abc import Iterable
+from functools import cache
 from typing import Any, TypeVar
 
 from pydantic import BaseModel
@@ -85,8 +86,14 @@ def refuse(settings: BaseModel, keys: Iterable[str], who: str) -> None:
 def _with_default(settings: Any, parts: list[str]) -> Any:
     name, *rest = parts
     own = getattr(settings, name)
-    default = getattr(type(settings)(), name)
+    model: type[BaseModel] = type(settings)
+    default = getattr(_defaults(model), name)
     return settings.model_copy(update={name: _with_default(own, rest) if rest else default})
+
+
+@cache
+def _defaults(model: type[BaseModel]) -> BaseModel:
+    return model()
 
 
 def _get(settings: Any, key: str) -> Any:

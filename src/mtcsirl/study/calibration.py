@@ -20,6 +20,7 @@ from mtcsirl.irl.methods import METHODS
 from mtcsirl.irl.methods.base import Setup
 from mtcsirl.names import SINGLE_TASKS, TRAIN_TASKS
 from mtcsirl.settings import IrlSettings, SacSettings
+from mtcsirl.settings.loading import validate
 from mtcsirl.study.plan import Rates
 from mtcsirl.transitions import Transitions
 from mtcsirl.worlds.environments import make_environment
@@ -30,29 +31,36 @@ UPDATES = 40
 TOGETHER = 6
 """Generators of the multi-task experiment at desk scale."""
 START = (
-    "from mtcsirl import stages; from mtcsirl.worlds.environments import make_environment; make_environment('reach', 0)"
+    "from mtcsirl.stages import train_sac; from mtcsirl.worlds.environments import make_environment;"
+    " make_environment('reach', 0)"
 )
+"""What a job does before it trains: imports its stage, makes its environment."""
 LOAD = "from mtcsirl.study.calibration import sac_update; import torch; torch.set_num_threads(1); print(sac_update(64))"
 
 
 def calibrate() -> Rates:
-    """All rates of this machine."""
+    """All rates of this machine.
+
+    Raises:
+        UserError: one of them cannot be, such as 0 seconds.
+    """
     torch.set_num_threads(1)
     steps = {task: environment_step(task) for task in dict.fromkeys((*SINGLE_TASKS, *TRAIN_TASKS))}
     found = machine()
-    return Rates(
-        machine=f"{found['processor']}, {found['cores']} cores",
-        start_up=_start_up(),
-        environment_step={"default": round(statistics.median(steps.values()), 7), **steps},
-        action=_seconds(_acting(), 200),
-        sac_update={size: sac_update(size) for size in MINIBATCHES},
-        lockstep=_lockstep(SacSettings().minibatch),
-        discriminator_update={size: _discriminator_update(size) for size in MINIBATCHES},
-        slowdown=_slowdown(2),
-        base_memory_mib=500,
-        agent_disk_mib=0.6,
-        bootstrap=0.002,
-    )
+    rates = {
+        "machine": f"{found['processor']}, {found['cores']} cores",
+        "start_up": _start_up(),
+        "environment_step": {"default": round(statistics.median(steps.values()), 7), **steps},
+        "action": _seconds(_acting(), 200),
+        "sac_update": {size: sac_update(size) for size in MINIBATCHES},
+        "lockstep": _lockstep(SacSettings().minibatch),
+        "discriminator_update": {size: _discriminator_update(size) for size in MINIBATCHES},
+        "slowdown": _slowdown(2),
+        "base_memory_mib": 420,
+        "agent_disk_mib": 0.6,
+        "bootstrap": 0.002,
+    }
+    return validate(Rates, rates)
 
 
 def environment_step(task: str) -> float:

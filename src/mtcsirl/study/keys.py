@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import re
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Callable, Hashable, Mapping
+from dataclasses import replace
 from string import Formatter
 from typing import Any, ClassVar, Generic, TypeVar
 
@@ -19,11 +20,28 @@ from mtcsirl.study.ablations import changes, prefix
 from mtcsirl.study.code import code_of
 
 S = TypeVar("S", bound=Frozen, covariant=True)
+Slice = TypeVar("Slice", bound=Frozen)
+
+
+_SLICES: dict[tuple[Any, ...], tuple[Settings, Any]] = {}
+
+
+def sliced(make: Callable[..., Slice], settings: Settings, *about: Hashable) -> Slice:
+    """``make(settings, *about)``, computed once: runs that differ in their seed alone share their settings."""
+    place = make, id(settings), *about
+    if place not in _SLICES:
+        _SLICES[place] = settings, make(settings, *about)  # keeps ``settings`` alive, so that its id stays its own
+    made: Slice = _SLICES[place][1]
+    return made
 
 
 def varied(settings: Settings, variant: str) -> Settings:
     """``settings`` with the changes of a variant, as in ``ablation_replay/latest``; the main study has none."""
-    return validate(Settings, merge(settings.model_dump(mode="json"), changes(variant))) if variant else settings
+    return sliced(_changed, settings, variant) if variant else settings
+
+
+def _changed(settings: Settings, variant: str) -> Settings:
+    return validate(Settings, merge(settings.model_dump(mode="json"), changes(variant)))
 
 
 class Run(ABC, Generic[S]):
@@ -61,13 +79,24 @@ class Run(ABC, Generic[S]):
         """What the run is made from under ``settings``."""
         own = self.settings(settings)
         inputs = {role: identity_of(run, settings).hash for role, run in self.needs.items()}
-        return identity(self.stage, self.about, own, inputs)
+        return replace(_alike(self.stage, self.about, own), key=self.about, inputs=inputs)
 
 
 def identity(stage: str, about: Mapping[str, Any], own: Frozen, inputs: Mapping[str, str]) -> Identity:
     """The identity of a run with the settings ``own`` over inputs, role -> hash of their identity."""
     said = identifying(own)
     return Identity(stage, dict(about), said, code_of(stage, said, about.get("method", "")), dict(inputs))
+
+
+_ALIKE: dict[tuple[str, int, str], tuple[Frozen, Identity]] = {}
+
+
+def _alike(stage: str, about: Mapping[str, Any], own: Frozen) -> Identity:
+    """An identity with the settings and the code of all runs that share the settings ``own``."""
+    place = stage, id(own), about.get("method", "")
+    if place not in _ALIKE:
+        _ALIKE[place] = own, identity(stage, about, own, {})
+    return _ALIKE[place][1]
 
 
 _KNOWN: dict[tuple[Run[Any], int], tuple[Settings, Identity]] = {}
@@ -77,7 +106,7 @@ def identity_of(run: Run[Any], settings: Settings) -> Identity:
     """``run.identity(settings)``, computed once."""
     place = run, id(settings)
     if place not in _KNOWN:
-        _KNOWN[place] = settings, run.identity(settings)  # keeps ``settings`` alive, so that its id stays its own
+        _KNOWN[place] = settings, run.identity(settings)
     return _KNOWN[place][1]
 
 

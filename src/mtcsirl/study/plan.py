@@ -8,44 +8,71 @@ against each other; the start page of a finished study gives the cost as measure
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import singledispatch
-from itertools import pairwise
+from math import ceil
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
+from pydantic import Field, field_validator
 
+from mtcsirl.errors import UserError
 from mtcsirl.files.storage import read_json
 from mtcsirl.settings import EvaluationSettings, SacSettings, Settings
 from mtcsirl.settings.base import Frozen
 from mtcsirl.settings.loading import validate
 from mtcsirl.settings.runs import AgentRunSettings, IrlRunSettings
+from mtcsirl.study.memory import (
+    BYTES_PER_TRANSITION,
+    agent_memory,
+    demonstrations_memory,
+    irl_memory,
+    score_memory,
+    weights,
+)
 from mtcsirl.study.runs import AnyRun, Baseline, Demonstrations, Expert, IrlRun, Score, Transfer
 
 CALIBRATION = Path(__file__).with_name("calibration.json")
-BYTES_PER_TRANSITION = 4 * (39 + 4 + 39 + 1)
 MEASURED_HIDDEN = {"sac": (256, 256), "f": (128, 128)}
 """Hidden layers of the networks whose updates were measured."""
 INPUTS = 82
 """(s, a, s') of a learned reward."""
 SCORE_SETS = 5
 """Transition sets of score_reward that are rolled out."""
+MEMORY_MARGIN = 1.25
+OTHER_MACHINES = 2.0
+"""How much slower than the calibrated one a machine may be for a run to end in its time."""
+LEAST_MINUTES = 10
+
+
+Seconds = Annotated[float, Field(gt=0)]
+"""No rate is zero, negative or infinite: whoever measured one has measured something else."""
+ByMinibatch = Annotated[dict[Annotated[int, Field(gt=0)], Seconds], Field(min_length=1)]
 
 
 class Rates(Frozen):
     """Measured on one idle core; seconds unless the name says otherwise. Minibatches are keys of ``*_update``."""
 
-    machine: str
-    start_up: float
-    environment_step: dict[str, float]
-    action: float
-    sac_update: dict[int, float]
-    lockstep: float
+    machine: Annotated[str, Field(min_length=1)]
+    start_up: Seconds
+    environment_step: dict[str, Seconds]
+    action: Seconds
+    sac_update: ByMinibatch
+    lockstep: Annotated[float, Field(gt=0)]
     """What an agent's gradient step costs among those of several generators, as a share of a lone one's."""
-    discriminator_update: dict[int, float]
-    slowdown: float
+    discriminator_update: ByMinibatch
+    slowdown: Annotated[float, Field(ge=1)]
     """Factor on everything when every core is busy."""
-    base_memory_mib: float
-    agent_disk_mib: float
-    bootstrap: float
+    base_memory_mib: Annotated[float, Field(gt=0)]
+    """Of a job with one environment, before it holds anything."""
+    agent_disk_mib: Annotated[float, Field(gt=0)]
+    bootstrap: Annotated[float, Field(ge=0)]
+
+    @field_validator("environment_step")
+    @classmethod
+    def _has_a_default(cls, steps: dict[str, float]) -> dict[str, float]:
+        if "default" not in steps:
+            raise ValueError("must have a rate named default, for tasks that were not measured")
+        return steps
 
     def step(self, task: str) -> float:
         """One environment step of ``task`` with the action for it."""
@@ -69,8 +96,21 @@ class Cost:
 
 
 def load_rates(path: Path | str = CALIBRATION) -> Rates:
-    """The rates in a calibration file."""
-    return validate(Rates, read_json(path))
+    """The rates in a calibration file.
+
+    Raises:
+        UserError: the file is missing, empty or no JSON, or a rate is missing or cannot be.
+    """
+    said = read_json(path)
+    if not isinstance(said, dict):
+        raise UserError(f"{path}: holds no rates; write it by mtcsirl calibrate --output {path}")
+    if missing := [name for name in Rates.model_fields if name not in said]:
+        raise UserError(f"{path}: lacks {', '.join(missing)}; measure again by mtcsirl calibrate --output {path}")
+    try:
+        return validate(Rates, said)
+    except UserError as error:
+        reason = str(error).removeprefix("configuration: ")
+        raise UserError(f"{path}: {reason}; measure again by mtcsirl calibrate --output {path}") from error
 
 
 @singledispatch
@@ -98,7 +138,7 @@ def _of_transfer(run: Transfer, settings: Settings, rates: Rates) -> Cost:
 def _of_demonstrations(run: Demonstrations, settings: Settings, rates: Rates) -> Cost:
     own = run.settings(settings)
     steps = own.episodes * own.episode_steps
-    memory = rates.base_memory_mib + steps * 4 * BYTES_PER_TRANSITION / 2**20
+    memory = demonstrations_memory(steps, rates.base_memory_mib)
     return Cost(rates.start_up + steps * rates.step(run.task), memory, steps * BYTES_PER_TRANSITION / 2**20)
 
 
@@ -111,15 +151,15 @@ def _of_irl(run: IrlRun, settings: Settings, rates: Rates) -> Cost:
 def _of_score(run: Score, settings: Settings, rates: Rates) -> Cost:
     score = run.settings(settings).score
     seconds = rates.start_up + SCORE_SETS * score.transitions * rates.step(run.task)
-    return Cost(seconds + score.bootstrap * rates.bootstrap, rates.base_memory_mib, 1.0)
+    memory = score_memory(run.irl.settings(settings), len(run.irl.members), rates.base_memory_mib)
+    return Cost(seconds + score.bootstrap * rates.bootstrap, memory, 1.0)
 
 
 def _agent(own: AgentRunSettings, task: str, rates: Rates, tried: int) -> Cost:
     """``tried``: environment steps beside training."""
     updates = max((own.steps - own.sac.random_steps) * own.sac.updates_per_step, 0)
     seconds = (own.steps + tried) * rates.step(task) + updates * _sac_update(own.sac, rates)
-    memory = rates.base_memory_mib + own.steps * BYTES_PER_TRANSITION / 2**20
-    return Cost(rates.start_up + seconds, memory, rates.agent_disk_mib)
+    return Cost(rates.start_up + seconds, agent_memory(own, rates.base_memory_mib), rates.agent_disk_mib)
 
 
 def _irl(own: IrlRunSettings, tasks: list[str], rates: Rates) -> Cost:
@@ -127,13 +167,12 @@ def _irl(own: IrlRunSettings, tasks: list[str], rates: Rates) -> Cost:
     rounds = irl.warm_up_iterations + irl.iterations
     update = irl.generator_updates * _sac_update(own.sac, rates) * (rates.lockstep if len(tasks) > 1 else 1.0)
     step = rates.update(rates.discriminator_update, irl.discriminator.minibatch)
-    size = _weights(INPUTS, irl.discriminator.hidden_sizes, 1) / _weights(INPUTS, MEASURED_HIDDEN["f"], 1)
+    size = weights(INPUTS, irl.discriminator.hidden_sizes, 1) / weights(INPUTS, MEASURED_HIDDEN["f"], 1)
     discriminate = irl.discriminator_updates * step * size
     seconds = rates.start_up + len(tasks) * (rounds * update + irl.iterations * discriminate)
     steps = rounds * irl.steps_per_iteration
     seconds += sum((steps + _evaluation_steps(own.evaluation)) * rates.step(task) for task in tasks)
-    held = min(steps, irl.generator_memory) + own.demonstration_episodes * own.evaluation.episode_steps
-    memory = rates.base_memory_mib + len(tasks) * held * BYTES_PER_TRANSITION / 2**20
+    memory = irl_memory(own, len(tasks), rates.base_memory_mib)
     kept = min(irl.generator_replay, rounds) * irl.steps_per_iteration
     return Cost(seconds, memory, len(tasks) * (rates.agent_disk_mib + kept * BYTES_PER_TRANSITION / 2**20))
 
@@ -151,14 +190,26 @@ def _sac_update(sac: SacSettings, rates: Rates) -> float:
     """
 
     def products(hidden: tuple[int, ...], critics: int) -> int:
-        return 4 * _weights(39, hidden, 8) + 6 * critics * _weights(43, hidden, 1)
+        return 4 * weights(39, hidden, 8) + 6 * critics * weights(43, hidden, 1)
 
     size = products(sac.hidden_sizes, sac.critics) / products(MEASURED_HIDDEN["sac"], 2)
     return rates.update(rates.sac_update, sac.minibatch) * size
 
 
-def _weights(inputs: int, hidden: tuple[int, ...], outputs: int) -> int:
-    return sum(first * second for first, second in pairwise((inputs, *hidden, outputs)))
+@dataclass(frozen=True)
+class Request:
+    """What a workflow asks a cluster for: memory in units of 10^6 bytes, and minutes."""
+
+    mem_mb: int
+    minutes: int
+
+
+def request(run: AnyRun, settings: Settings, rates: Rates, attempt: int = 1) -> Request:
+    """Memory and time of one run with a margin for other machines; half as much again, each, on every further try."""
+    own, more = cost(run, settings, rates), 1.5 ** (attempt - 1)
+    minutes = OTHER_MACHINES * rates.slowdown * own.seconds / 60
+    megabytes = MEMORY_MARGIN * own.memory_mib * 2**20 / 1e6
+    return Request(ceil(megabytes * more), ceil((LEAST_MINUTES + minutes) * more))
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,7 @@ from mtcsirl.settings.runs import (
     score_run,
     transfer_run,
 )
-from mtcsirl.study.keys import Run, key_of, varied
+from mtcsirl.study.keys import Run, key_of, sliced, varied
 
 
 @dataclass(frozen=True, order=True)
@@ -41,7 +41,7 @@ class Expert(Run[AgentRunSettings]):
 
     def settings(self, settings: Settings) -> AgentRunSettings:
         """The slice of the configuration that the run depends on."""
-        return expert_run(varied(settings, self.variant), self.task, self.cs_reward)
+        return sliced(expert_run, varied(settings, self.variant), self.task, self.cs_reward)
 
 
 @dataclass(frozen=True, order=True)
@@ -61,7 +61,7 @@ class Baseline(Run[AgentRunSettings]):
 
     def settings(self, settings: Settings) -> AgentRunSettings:
         """The slice of the configuration that the run depends on."""
-        return baseline_run(settings, self.task)
+        return sliced(baseline_run, settings, self.task)
 
 
 @dataclass(frozen=True, order=True)
@@ -109,7 +109,7 @@ class Demonstrations(Run[DemonstrationRunSettings]):
 
     def settings(self, settings: Settings) -> DemonstrationRunSettings:
         """The slice of the configuration that the run depends on."""
-        return demonstration_run(settings, self.cs_reward)
+        return sliced(demonstration_run, settings, self.cs_reward)
 
 
 @dataclass(frozen=True, order=True)
@@ -143,8 +143,8 @@ class IrlRun(Run[IrlRunSettings]):
 
     def settings(self, settings: Settings) -> IrlRunSettings:
         """The slice of the configuration that the run depends on."""
-        tasks = {task for task, _ in self.members}
-        return irl_run(varied(settings, self.variant), self.experiment, tasks, self.method)
+        tasks = frozenset(task for task, _ in self.members)
+        return sliced(irl_run, varied(settings, self.variant), self.experiment, tasks, self.method)
 
 
 def demonstrations_role(index: int, task: str, target: int) -> str:
@@ -191,7 +191,7 @@ class Transfer(Run[AgentRunSettings]):
 
     def settings(self, settings: Settings) -> AgentRunSettings:
         """The slice of the configuration that the run depends on."""
-        return transfer_run(varied(settings, self.variant), self.task)
+        return sliced(transfer_run, varied(settings, self.variant), self.task)
 
 
 @dataclass(frozen=True, order=True)
@@ -224,7 +224,7 @@ class Score(Run[ScoreRunSettings]):
 
     def settings(self, settings: Settings) -> ScoreRunSettings:
         """The slice of the configuration that the run depends on."""
-        return score_run(settings)
+        return sliced(score_run, settings)
 
 
 AnyRun = Expert | Baseline | Demonstrations | IrlRun | Transfer | Score
