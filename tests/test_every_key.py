@@ -72,7 +72,7 @@ IRL = {
     "evaluation": EVALUATION | {"episode_steps": 12},
 }
 COLLECT = {"episodes": 2, "episode_steps": 24}
-SCORE = {"score": {"transitions": 40, "bootstrap": 5}}
+SCORE = {"score": {"transitions": 40, "bootstrap": 5, "points": 10}}
 
 OTHERS: dict[str, Any] = {
     "environment.observation": "raw",

@@ -45,9 +45,9 @@ except UserError as error:
 
 STUDY = design(SETTINGS)
 RUNS = {run.folder: run for name in (None, *ABLATIONS) for run in design(SETTINGS, name)}
-MADE = settle(RUNS.values(), SETTINGS)
+MADE = settle(RUNS.values(), SETTINGS, mark=workflow.is_main_process)
 PAGES = [*ARTEFACTS, CLAIMS, *ABLATIONS, "report", "reward_quality", "diagnostics", "validation"]
-MADE_PAGES = settle_artefacts(PAGES, SETTINGS)
+MADE_PAGES = settle_artefacts(PAGES, SETTINGS, mark=workflow.is_main_process)
 RATES = load_rates()
 RESULTS = SETTINGS.results
 # plain `snakemake` of a virtual environment that is not activated finds `mtcsirl` beside itself

@@ -148,12 +148,12 @@ def unsign_artefact(name: str, settings: Settings) -> None:
         write_marker(folder, None)
 
 
-def settle_artefacts(names: Iterable[str], settings: Settings) -> dict[str, str]:
+def settle_artefacts(names: Iterable[str], settings: Settings, *, mark: bool = True) -> dict[str, str]:
     """As :func:`mtcsirl.study.standing.settle`, of artefacts."""
     wanted = {}
     for name in names:
         wanted[name] = artefact_identity(name, settings).hash
         folder = record_folder(name, settings.results)
-        if folder.is_dir():
+        if mark and folder.is_dir():
             write_marker(folder, wanted[name] if artefact_standing(name, settings).state == DONE else None)
     return wanted

@@ -53,16 +53,17 @@ def _over_its_inputs(run: Run[Any], record: Record, results: Path) -> Standing:
     return Standing(DONE, (), record)
 
 
-def settle(runs: Iterable[Run[Any]], settings: Settings) -> dict[str, str]:
+def settle(runs: Iterable[Run[Any]], settings: Settings, *, mark: bool = True) -> dict[str, str]:
     """Leave in every folder the marker of what stands there; returns the hash that each run must have, by folder.
 
     Markers are a workflow's view: rewritten from the records each time it is read, whatever happened in between.
+    Without ``mark`` none is touched: a job that reads the workflow would take away what another has just left.
     """
     wanted: dict[str, str] = {}
     for run in runs:
         wanted[run.folder] = identity_of(run, settings).hash
         folder = Path(settings.results) / run.folder
-        if folder.is_dir():
+        if mark and folder.is_dir():
             done = standing(run, settings).state == DONE
             write_marker(folder, wanted[run.folder] if done else None)
     return wanted
