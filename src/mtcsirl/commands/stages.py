@@ -1,8 +1,6 @@
 """The verbs that train, learn and measure: one per stage of the DAG, and ``evaluate``."""
 
 import argparse
-from collections.abc import Iterator
-from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 
@@ -131,8 +129,8 @@ def _learn_reward(verbs: Verbs) -> None:
         of_members = partial(irl_run, experiment=experiment, tasks=tasks, method=parsed.method)
         settings = run_settings(parsed, IrlRunSettings, of_members, "learn_reward")
         learning = Learning(experiment, parsed.method, parsed.cs_reward, source, parsed.seed)
-        with _stepped_by(parsed.workers):
-            learn_reward(settings, learning, parsed.demonstrations, parsed.output, wanted=parsed.identity)
+        shown = parsed.demonstrations
+        learn_reward(settings, learning, shown, parsed.output, wanted=parsed.identity, workers=parsed.workers)
 
     verb = add_verb(
         verbs,
@@ -154,23 +152,6 @@ def _learn_reward(verbs: Verbs) -> None:
     add_run_settings(verb)
     add_output(verb)
     add_identity(verb)
-
-
-@contextmanager
-def _stepped_by(workers: int) -> Iterator[None]:
-    """IRL's environments in so many processes.
-
-    They change no byte, so that neither the stage nor what a run is made from has a word for them: they are put in from
-    outside.
-    """
-    from mtcsirl.irl import run
-
-    make_environments = run.make_environments
-    run.make_environments = partial(make_environments, workers=workers)
-    try:
-        yield
-    finally:
-        run.make_environments = make_environments
 
 
 def _transfer(verbs: Verbs) -> None:

@@ -57,19 +57,21 @@ def learn_reward(
     about: Mapping[str, Any] | None = None,
     run: str = "",
     stopwatch: Stopwatch | None = None,
+    workers: int = 0,
 ) -> None:
     """Learn a reward from T files of demonstrations, one per (task, target), and write the run into ``folder``.
 
     ``cs_reward`` names what the experts were trained with; it is measured, never trained on. A checkpoint in
     ``folder`` of the same run is taken up, and the run ends with the bytes of one that was never stopped; the caller
     removes it when all results stand. ``run``: what the result depends on beside the arguments (the code): a checkpoint
-    of another run is not taken up. ``stopwatch`` learns what earlier tries spent.
+    of another run is not taken up. ``stopwatch`` learns what earlier tries spent. ``workers``: processes that step the
+    environments; they change no byte.
 
     Raises:
         UserError: unknown method or cs-reward; unreadable demonstrations; a number that is not finite any more.
     """
     folder = Path(folder)
-    trainer = make_trainer(method, cs_reward, demonstrations, seed, settings)
+    trainer = make_trainer(method, cs_reward, demonstrations, seed, settings, workers=workers)
     try:
         run = _fingerprint(run, method, cs_reward, [checksum(file) for file in demonstrations], seed, settings)
         _train(trainer, folder / CHECKPOINT, run, stopwatch or Stopwatch())
@@ -79,7 +81,13 @@ def learn_reward(
 
 
 def make_trainer(
-    method: str, cs_reward: str, demonstrations: Sequence[Path | str], seed: int, settings: IrlRunSettings
+    method: str,
+    cs_reward: str,
+    demonstrations: Sequence[Path | str],
+    seed: int,
+    settings: IrlRunSettings,
+    *,
+    workers: int = 0,
 ) -> IrlTrainer:
     """The trainer of a run on Meta-World; see ``learn_reward``."""
     if method not in METHODS:
@@ -91,7 +99,7 @@ def make_trainer(
     experts = load_demonstrations(demonstrations, episodes=episodes, observation=observation, cs_reward=cs_reward)
     world = World(
         members=experts.members,
-        environments=make_environments(experts.members, settings.environment),
+        environments=make_environments(experts.members, settings.environment, workers),
         truth=ground_truth(cs_reward, observation),
         measure_episode=functools.partial(measure_episode, observation=observation),
     )

@@ -39,8 +39,9 @@ def learn_reward(
     output: Path,
     *,
     wanted: str | None = None,
+    workers: int = 0,
 ) -> None:
-    """Learn the reward from files of demonstrations into the folder ``output``."""
+    """Learn the reward from files of demonstrations into the folder ``output``; ``workers`` step the environments."""
     shown = {demonstrations_role(index, *member_of(file)): file for index, file in enumerate(demonstrations)}
     inputs = {role: look_at(file.parent, [file.name]) for role, file in shown.items()}
     made_from = identity(STAGE, learning._asdict(), settings, {role: one.hash for role, one in inputs.items()})
@@ -58,4 +59,5 @@ def learn_reward(
                 about=about,
                 run=made_from.hash,
                 stopwatch=stopwatch,
+                workers=workers,
             )
