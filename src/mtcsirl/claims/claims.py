@@ -54,7 +54,9 @@ class Finding:
 @cache
 def load_criteria() -> dict[str, Any]:
     """The criteria as shipped with the package."""
-    return yaml.safe_load(resources.files("mtcsirl.claims").joinpath("claims.yaml").read_text(encoding="utf-8"))
+    text = resources.files("mtcsirl.claims").joinpath("claims.yaml").read_text(encoding="utf-8")
+    criteria: dict[str, Any] = yaml.safe_load(text)
+    return criteria
 
 
 def judge(

@@ -92,7 +92,8 @@ def _counts(statuses: "list[RunStatus]") -> str:
 
 def _status_lines(statuses: "list[RunStatus]") -> list[str]:
     """Stages with their counts, then what runs, failed or is stale, each with what it says."""
-    from mtcsirl.study.status import FAILED, RUNNING, STALE, STATES
+    from mtcsirl.study.standing import STALE
+    from mtcsirl.study.status import FAILED, RUNNING, STATES
 
     lines = []
     for stage in dict.fromkeys(status.run.stage for status in statuses):

@@ -58,7 +58,8 @@ class Policy:
         mean, log_std = self.head(observation)
         if generator is not None:
             mean = mean + np.exp(log_std) * generator.standard_normal(mean.shape, dtype=np.float32)
-        return np.tanh(mean)
+        action: np.ndarray = np.tanh(mean)
+        return action
 
 
 def finite_action(

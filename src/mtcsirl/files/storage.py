@@ -12,7 +12,7 @@ import tempfile
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, Any
+from typing import IO, TYPE_CHECKING, Any, TypeVar
 
 from mtcsirl.errors import UserError
 from mtcsirl.files.identity import verify, why_absent
@@ -22,6 +22,8 @@ from mtcsirl.files.lock import locked as locked
 if TYPE_CHECKING:
     import pandas as pd
     import torch
+
+Parsed = TypeVar("Parsed")
 
 
 @contextmanager
@@ -49,7 +51,7 @@ def atomic(path: Path | str, mode: str = "w") -> Iterator[IO[Any]]:
             temporary.unlink()
 
 
-def _read(path: Path | str, parse: Callable[[Path], Any], what: str) -> Any:
+def _read(path: Path | str, parse: Callable[[Path], Parsed], what: str) -> Parsed:
     path = Path(path)
     if not path.is_file():
         raise UserError(f"{path}: {why_absent(path)}")

@@ -22,7 +22,8 @@ def pearson(first: Tensor, second: Tensor) -> Tensor:
     """Pearson's r along the last dimension [..., N] -> [...]; nan where one of the two does not vary."""
     first, second = first.double(), second.double()
     first, second = first - first.mean(-1, keepdim=True), second - second.mean(-1, keepdim=True)
-    return (first * second).sum(-1) / (first.norm(dim=-1) * second.norm(dim=-1))
+    norms: Tensor = first.norm(dim=-1) * second.norm(dim=-1)
+    return (first * second).sum(-1) / norms
 
 
 def episode_rows(world: World, rollout: Transitions, flags: Flags, first_step: int, episode_steps: int) -> list[Row]:

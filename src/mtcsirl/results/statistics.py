@@ -7,7 +7,7 @@ std and interval are NaN, never 0.
 
 from collections.abc import Callable, Sequence
 from functools import cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -206,7 +206,8 @@ def mean_correlation(correlations: ArrayLike, confidence: float = 0.95) -> Estim
 
 def _known(values: ArrayLike) -> Array:
     array = np.asarray(values, dtype=float).ravel()
-    return array[~np.isnan(array)]
+    known: Array = array[~np.isnan(array)]
+    return known
 
 
 def _matrix(values: ArrayLike) -> Array:
@@ -274,7 +275,7 @@ def _noncentrality(t: float, degrees: int, confidence: float) -> Interval:
     return Interval(solve((1 + confidence) / 2), solve((1 - confidence) / 2))
 
 
-def _tree(rows: NDArray[np.intp], labels: NDArray[np.intp]) -> list:
+def _tree(rows: NDArray[np.intp], labels: NDArray[np.intp]) -> list[Any]:
     """Rows grouped by the first label column, then by the next; leaves are arrays of row numbers."""
     groups = [labels[:, 0] == value for value in np.unique(labels[:, 0])]
     if labels.shape[1] == 1:
@@ -282,7 +283,7 @@ def _tree(rows: NDArray[np.intp], labels: NDArray[np.intp]) -> list:
     return [_tree(rows[group], labels[group, 1:]) for group in groups]
 
 
-def _draw(tree: list, generator: np.random.Generator) -> list[NDArray[np.intp]]:
+def _draw(tree: list[Any], generator: np.random.Generator) -> list[NDArray[np.intp]]:
     picked = [tree[i] for i in generator.integers(len(tree), size=len(tree))]
     if isinstance(picked[0], list):
         return [leaf for branch in picked for leaf in _draw(branch, generator)]

@@ -31,7 +31,8 @@ def velocity(transitions: Transitions) -> Tensor:
     and a position of 0.6 m is known to 6e-8 m only; and a transition whose s' alone is stored can be measured too.
     """
     after = transitions.next_observation
-    return (after[..., _HAND] - after[..., _PREVIOUS_HAND]).norm(dim=-1) / STEP_SECONDS
+    metres: Tensor = (after[..., _HAND] - after[..., _PREVIOUS_HAND]).norm(dim=-1)
+    return metres / STEP_SECONDS
 
 
 def action_norm(transitions: Transitions) -> Tensor:

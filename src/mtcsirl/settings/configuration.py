@@ -46,7 +46,7 @@ def _registered(name: str, registry: Mapping[str, object], what: str) -> str:
     return name
 
 
-def _unique(values: tuple) -> tuple:
+def _unique(values: tuple[Any, ...]) -> tuple[Any, ...]:
     if len(set(values)) != len(values):
         raise ValueError("lists an entry twice")
     return values

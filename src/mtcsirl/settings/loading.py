@@ -126,7 +126,8 @@ def _message(model: type[BaseModel], path: tuple[str, ...], item: Any) -> str:
         return "must be a list"
     if item["type"] in ("model_type", "dict_type"):
         return "must be a mapping of keys to values"
-    return item["msg"].removeprefix("Value error, ").replace("Input should be", "must be")
+    message: str = item["msg"]
+    return message.removeprefix("Value error, ").replace("Input should be", "must be")
 
 
 def _unknown_key(model: type[BaseModel], path: tuple[str, ...]) -> str:

@@ -93,7 +93,7 @@ class _Loader(yaml.SafeLoader):
         """One node; refuses it when it lies too deep or, aliases written out, stands for too many values."""
         self._depth += 1
         if self._depth > DEEPEST:
-            raise StrictError(f"nested more than {DEEPEST} deep{_place(self.peek_event())}")
+            raise StrictError(f"nested more than {DEEPEST} deep{_place(self.peek_event())}")  # type: ignore[no-untyped-call]
         alias = self.check_event(yaml.AliasEvent)
         node: yaml.Node | None = super().compose_node(parent, index)
         self._depth -= 1

@@ -11,13 +11,13 @@ from pathlib import Path
 
 from mtcsirl.errors import UserError
 from mtcsirl.files import storage
+from mtcsirl.files.fingerprint import digest
 from mtcsirl.files.identity import (
     FILE,
     NOTE,
     Identity,
     Record,
     checksums,
-    digest,
     dumps,
     lost,
     read_record,

@@ -53,7 +53,8 @@ def task_reward(next_state: np.ndarray, goal: np.ndarray) -> np.ndarray:
 
 def speed(transitions: Transitions) -> Tensor:
     """Speed [...] in m/s, read from the positions before and after."""
-    return (transitions.next_observation[..., :2] - transitions.observation[..., :2]).norm(dim=-1) / STEP
+    metres: Tensor = (transitions.next_observation[..., :2] - transitions.observation[..., :2]).norm(dim=-1)
+    return metres / STEP
 
 
 def common_sense_reward(transitions: Transitions) -> Tensor:

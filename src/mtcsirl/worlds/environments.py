@@ -65,14 +65,14 @@ class VelocityMap(ObservationMap):
     def apply(self, raw: Array) -> Array:
         """Return the mapped observation [..., 39]."""
         centre, scale = _constants(raw)
-        mapped = (raw - centre) * scale
+        mapped: Array = (raw - centre) * scale
         mapped[..., PREVIOUS] = (raw[..., CURRENT] - raw[..., PREVIOUS]) * _RATE
         return mapped
 
     def invert(self, mapped: Array) -> Array:
         """Return the raw observation [..., 39], exact to rounding: 1e-7 m in float32."""
         centre, scale = _constants(mapped)
-        raw = mapped / scale + centre
+        raw: Array = mapped / scale + centre
         raw[..., PREVIOUS] = raw[..., CURRENT] - mapped[..., PREVIOUS] / _RATE
         return raw
 

@@ -118,7 +118,8 @@ class FastEnvironment(SawyerXYZEnv):
     @property
     def tcp_center(self) -> np.ndarray:
         """The point [3] between the two fingers."""
-        return (self._right_finger + self._left_finger) / 2.0
+        centre: np.ndarray = (self._right_finger + self._left_finger) / 2.0
+        return centre
 
     def touching_object(self, object_geom_id: int) -> bool:
         """Return whether both pads of the gripper press on the object."""
@@ -129,7 +130,8 @@ class FastEnvironment(SawyerXYZEnv):
     def _pressure(self, pad: int, of_object: np.ndarray) -> float:
         contact = self.data.contact
         addresses = contact.efc_address[of_object & (contact.geom == pad).any(axis=1)]
-        return sum(self.data.efc_force[address] for address in addresses)
+        pressure: float = sum(self.data.efc_force[address] for address in addresses)
+        return pressure
 
     def _get_site_pos(self, site_name: str) -> np.ndarray:
         return self._position("site", site_name).copy()
