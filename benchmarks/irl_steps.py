@@ -38,7 +38,7 @@ from mtcsirl.agents.training import Training
 from mtcsirl.episodes.demonstrations import collect_demonstrations
 from mtcsirl.episodes.lockstep import Outcome
 from mtcsirl.files.storage import write_parquet
-from mtcsirl.irl.methods import METHODS
+from mtcsirl.irl.methods import make_method
 from mtcsirl.irl.methods.base import Setup
 from mtcsirl.irl.rollout import World
 from mtcsirl.irl.run import make_trainer
@@ -119,7 +119,7 @@ def _irl() -> Callable[[], None]:
     world = World(
         (("noise", 0),), _Noise(), lambda transitions: transitions.task_reward, lambda *_: {"task_reward": 0.0}
     )
-    method = METHODS["mt_csirl"](Setup(settings.irl, 1, 0))
+    method = make_method("mt_csirl", Setup(settings.irl, 1, 0))
     return IrlTrainer(
         method, world, Transitions(states, actions, following, torch.zeros(1, count)), settings, 0
     ).iterate

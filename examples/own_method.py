@@ -24,7 +24,7 @@ def mt_gail(setup: Setup) -> Method:
     """A discriminator that all tasks share; generators get r_t + alpha f."""
     loss = penalised(Adversarial(without_log_pi), setup.irl.discriminator.gradient_penalty, interpolated_points)
     discriminators = {"f": setup.shared(setup.perceptron(), loss)}
-    return Method("mt_gail", discriminators, lambda paid, learned, alpha: paid + alpha * learned["f"], True, True)
+    return Method(discriminators, lambda paid, learned, alpha: paid + alpha * learned["f"], True, True)
 
 
 METHODS["mt_gail"] = mt_gail

@@ -12,7 +12,7 @@ from mtcsirl.episodes.lockstep import Outcome
 from mtcsirl.errors import UserError
 from mtcsirl.files.checkpoint import save_checkpoint
 from mtcsirl.files.storage import checksum
-from mtcsirl.irl.methods import METHODS
+from mtcsirl.irl.methods import METHODS, make_method
 from mtcsirl.irl.methods.base import Setup
 from mtcsirl.irl.resume import load_state, state
 from mtcsirl.irl.rollout import collect
@@ -318,7 +318,7 @@ def test_unknown_names_are_one_clear_line(demonstrations, tmp_path) -> None:
 
 
 def test_two_rewards_of_one_task_do_not_start_equal() -> None:
-    method = METHODS["mt_csirl_lt"](Setup(irl=irl_settings().irl, tasks=1, seed=100))
+    method = make_method("mt_csirl_lt", Setup(irl=irl_settings().irl, tasks=1, seed=100))
     task, f = (method.discriminators[name].network.parameters for name in ("task", "f"))
     assert not torch.allclose(task, f)
 

@@ -105,10 +105,11 @@ class Method:
     per task.
     """
 
-    name: str
     discriminators: Mapping[str, Discriminator]
     policy_reward: GeneratorReward
     knows_task_reward: bool
     """Whether generators may train on the task reward: then they may be warmed up on it."""
     uses_curriculum: bool
     """Whether alpha = r_ave / R_MAX enters the policy reward; else alpha is 1."""
+    name: str = ""
+    """The one under which it is registered; ``make_method`` fills it in."""

@@ -23,7 +23,7 @@ from mtcsirl.files import stop
 from mtcsirl.files.checkpoint import load_checkpoint, save_checkpoint
 from mtcsirl.files.provenance import Stopwatch
 from mtcsirl.files.storage import checksum, write_csv, write_json, write_parquet
-from mtcsirl.irl.methods import METHODS
+from mtcsirl.irl.methods import METHODS, make_method
 from mtcsirl.irl.methods.base import Setup
 from mtcsirl.irl.resume import load_state, state
 from mtcsirl.irl.rollout import World
@@ -104,7 +104,7 @@ def make_trainer(
         measure_episode=functools.partial(measure_episode, observation=observation),
     )
     setup = Setup(irl=settings.irl, tasks=len(experts.members), seed=seed, discount=settings.sac.discount)
-    return IrlTrainer(METHODS[method](setup), world, experts.transitions, settings, seed)
+    return IrlTrainer(make_method(method, setup), world, experts.transitions, settings, seed)
 
 
 @stop.deferred()

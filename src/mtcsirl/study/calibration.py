@@ -16,7 +16,7 @@ import torch
 from mtcsirl.agents.sac import FusedSac
 from mtcsirl.files.provenance import machine
 from mtcsirl.irl.discriminator import Batch
-from mtcsirl.irl.methods import METHODS
+from mtcsirl.irl.methods import make_method
 from mtcsirl.irl.methods.base import Setup
 from mtcsirl.names import SINGLE_TASKS, TRAIN_TASKS
 from mtcsirl.settings import IrlSettings, SacSettings
@@ -91,7 +91,7 @@ def _lockstep(minibatch: int) -> float:
 
 
 def _discriminator_update(minibatch: int) -> float:
-    method = METHODS["mt_csirl"](Setup(irl=IrlSettings(), tasks=1, seed=0))
+    method = make_method("mt_csirl", Setup(irl=IrlSettings(), tasks=1, seed=0))
     (discriminator,) = method.discriminators.values()
     side, log_pi = _transitions(minibatch), torch.zeros(1, minibatch)
     batch = Batch(side, side, log_pi, log_pi, torch.ones(1, 1))

@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 import torch
 
-from mtcsirl.irl.methods import METHODS
+from mtcsirl.irl.methods import make_method
 from mtcsirl.irl.methods.base import Setup
 from mtcsirl.irl.rollout import World
 from mtcsirl.irl.trainer import IrlTrainer
@@ -155,7 +155,7 @@ def learn(expert: Planner, goals: Sequence[Goal], settings: ValidationSettings, 
         measure_episode=_measure_episode,
     )
     demonstrations = demonstrate(expert, goals, settings.episodes, seed + 1_000)
-    trainer = IrlTrainer(METHODS["mt_csirl"](setup), world, demonstrations, run, seed)
+    trainer = IrlTrainer(make_method("mt_csirl", setup), world, demonstrations, run, seed)
     while trainer.iteration < trainer.iterations:
         trainer.iterate()
     return trainer

@@ -3,12 +3,20 @@
 A file is imported when its method is built.
 """
 
+from __future__ import annotations
+
+from dataclasses import replace
 from importlib import import_module
+from typing import TYPE_CHECKING
 
 from mtcsirl import names
 from mtcsirl.extensions import METHODS, Builder
 
-__all__ = ["METHODS"]
+if TYPE_CHECKING:
+    from mtcsirl.irl.discriminator import Method
+    from mtcsirl.irl.methods.base import Setup
+
+__all__ = ["METHODS", "make_method"]
 
 
 def _builder(name: str) -> Builder:
@@ -16,3 +24,9 @@ def _builder(name: str) -> Builder:
 
 
 METHODS.update({name: _builder(name) for name in names.METHODS})
+
+
+def make_method(name: str, setup: Setup) -> Method:
+    """The method that is registered as ``name``."""
+    made: Method = replace(METHODS[name](setup), name=name)
+    return made

@@ -9,7 +9,6 @@ def mt_airl(setup: Setup) -> Method:
     """Discriminators of equation 1 that share f; generators get f alone."""
     loss = penalised(Adversarial(entire_reward_logit), setup.irl.discriminator.gradient_penalty, interpolated_points)
     return Method(
-        name="mt_airl",
         discriminators={"f": setup.shared(setup.perceptron(), loss)},
         policy_reward=lambda task_reward, learned, alpha: learned["f"],
         knows_task_reward=False,

@@ -12,7 +12,6 @@ def mt_csirl(setup: Setup) -> Method:
         Adversarial(known_task_reward_logit), setup.irl.discriminator.gradient_penalty, interpolated_points
     )
     return Method(
-        name="mt_csirl",
         discriminators={"f": setup.shared(setup.perceptron(), loss)},
         policy_reward=lambda task_reward, learned, alpha: mixed(task_reward, learned["f"], alpha),
         knows_task_reward=True,

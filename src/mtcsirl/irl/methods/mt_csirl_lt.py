@@ -23,7 +23,6 @@ def mt_csirl_lt(setup: Setup) -> Method:
     logit = entire_reward_logit if setup.irl.logit_temperature == "as_printed" else half_of_entire_reward_logit
     loss = penalised(Adversarial(logit), setup.irl.discriminator.gradient_penalty, interpolated_points)
     return Method(
-        name="mt_csirl_lt",
         discriminators={
             "task": setup.per_task(setup.perceptron(), loss),
             "f": setup.shared(setup.perceptron(), loss),

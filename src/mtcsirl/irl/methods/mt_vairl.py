@@ -7,7 +7,6 @@ from mtcsirl.irl.methods.base import Setup, bottlenecked
 def mt_vairl(setup: Setup) -> Method:
     """Discriminators of equation 1 that share a bottlenecked f; generators get f alone."""
     return Method(
-        name="mt_vairl",
         discriminators={"f": setup.shared(setup.bottleneck(), bottlenecked(setup.irl.discriminator))},
         policy_reward=lambda task_reward, learned, alpha: learned["f"],
         knows_task_reward=False,

@@ -10,7 +10,6 @@ def mt_vairl_gp(setup: Setup) -> Method:
     settings = setup.irl.discriminator
     loss = penalised(bottlenecked(settings), settings.vairl_gradient_penalty / 2, expert_points)
     return Method(
-        name="mt_vairl_gp",
         discriminators={"f": setup.shared(setup.bottleneck(), loss)},
         policy_reward=lambda task_reward, learned, alpha: learned["f"],
         knows_task_reward=False,
