@@ -66,7 +66,10 @@ def test_another_byte_of_the_page_is_another_code(file, tmp_path, monkeypatch):
         (tmp_path / name).parent.mkdir(exist_ok=True)
         shutil.copy(PACKAGE / name, tmp_path / name)
     monkeypatch.setattr(fingerprint, "PACKAGE", tmp_path)
+    fingerprint._data_hash.cache_clear()
     before = fingerprint.code.__wrapped__(("report.page",))
     (tmp_path / file).write_text((tmp_path / file).read_text(encoding="utf-8") + "\n", encoding="utf-8")
+    fingerprint._data_hash.cache_clear()
     after = fingerprint.code.__wrapped__(("report.page",))
+    fingerprint._data_hash.cache_clear()
     assert {name for name in after if after[name] != before[name]} == {file}
