@@ -57,7 +57,7 @@ def test_a_second_run_has_nothing_to_do(smoke: Path, snakemake: Snakemake) -> No
 
 NEUTRAL = {
     "a comment": ("agents/sac.py", r"\Z", "\n# said anew\n"),
-    "a docstring": ("irl/losses.py", r'"""Logits and losses', '"""Losses and logits'),
+    "a docstring": ("irl/losses.py", r'"""Logits, penalties', '"""Penalties, logits'),
     "a type": (
         "agents/replay.py",
         r"minibatch: int, recent: int \| None",
