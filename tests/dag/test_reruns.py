@@ -94,8 +94,8 @@ def test_a_function_moved_and_a_file_renamed_rerun_nothing(
 
 
 def test_a_new_key_with_the_value_of_old_reruns_nothing(smoke: Path, snakemake: Snakemake, change: Change) -> None:
-    key = '    novelty: float = key(0.0, "something new", absent=0.0)\n    device: str'
-    change("settings/learner.py", r"    device: str", key)
+    key = '    novelty: float = key(0.0, "something new", absent=0.0)\n    device: Annotated[str'
+    change("settings/learner.py", r"    device: Annotated\[str", key)
     assert plan(snakemake) == {}
     again = plan(snakemake, "--config", "sac={novelty: 1.0}")
     assert stages(again) >= {"train_expert", "train_sac", "learn_reward", "transfer"}
