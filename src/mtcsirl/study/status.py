@@ -54,7 +54,8 @@ def run_status(run: AnyRun, settings: Settings) -> RunStatus:
         return RunStatus(run, FAILED, says="; ".join(found.why))
     if log.is_file():
         starting = time.time() - log.stat().st_mtime < STARTING_SECONDS
-        return RunStatus(run, RUNNING if starting else FAILED, says=last_said(log))
+        if starting or log.stat().st_size:  # `snakemake --touch` leaves empty logs
+            return RunStatus(run, RUNNING if starting else FAILED, says=last_said(log))
     return RunStatus(run, STALE if found.state == STALE else WAITING, says="; ".join(found.why))
 
 
