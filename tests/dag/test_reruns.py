@@ -208,19 +208,30 @@ def test_neither_times_nor_records_nor_place_decide(smoke: Path, snakemake: Snak
     assert "Nothing to be done" in done.stdout + done.stderr
 
 
-def test_touching_does_not_hide_what_is_stale(smoke: Path, snakemake: Snakemake) -> None:
-    key = ("--config", "sac={discount: 0.9}")
-    snakemake("--touch", "--cores", "1", *SMOKE, *key)
-    assert stages(plan(snakemake, *key)) == RUNS
-
-
-def test_status_says_why(smoke: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+def check_status_says_why(smoke: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     monkeypatch.chdir(smoke)
     command = ["status", "--scale", "smoke", "--target", "figure_2"]
     assert cli.main([*command, "--set", "sac.discount=0.9"]) == 0
     said = [line for line in capsys.readouterr().out.splitlines() if line.startswith("stale: sac/")]
     assert len(said) == 1
     assert "sac.discount: 0.97 -> 0.9" in said[0]
+
+
+def test_status_says_why(smoke: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    check_status_says_why(smoke, monkeypatch, capsys)
+
+
+def test_touching_does_not_hide_what_is_stale(
+    smoke: Path, snakemake: Snakemake, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    key = ("--config", "sac={discount: 0.9}")
+    snakemake("--touch", "--cores", "1", *SMOKE, *key)
+    assert stages(plan(snakemake, *key)) == RUNS
+    logs = [log for log in smoke.glob("results/smoke/logs/**/*.log") if not log.stat().st_size]
+    assert logs, "touching leaves an empty log per run"
+    for log in logs:
+        os.utime(log, (1e9, 1e9))
+    check_status_says_why(smoke, monkeypatch, capsys)
 
 
 FLIPPED = (
