@@ -16,7 +16,6 @@ from mtcsirl.files.identity import (
     Identity,
     Record,
     checksum,
-    differences,
     dumps,
     lost,
     read_record,
@@ -28,7 +27,7 @@ from mtcsirl.study.ablations import ABLATIONS
 from mtcsirl.study.code import artefact_code
 from mtcsirl.study.design import ARTEFACTS, CLAIMS, design
 from mtcsirl.study.keys import identity_of
-from mtcsirl.study.standing import ABSENT, DONE, INCOMPLETE, STALE, Standing
+from mtcsirl.study.standing import DONE, STALE, Standing, of_folder
 from mtcsirl.worlds.drawable import lacking
 
 PLACES = {"results", "figures", "extensions"}
@@ -100,22 +99,11 @@ def record_folder(name: str, results: Path | str) -> Path:
 
 def artefact_standing(name: str, settings: Settings) -> Standing:
     """As :func:`mtcsirl.study.standing.standing`, of an artefact."""
-    folder = record_folder(name, settings.results)
-    try:
-        record = read_record(folder)
-    except UserError as error:
-        return Standing(INCOMPLETE, (str(error),))
-    if record is None:
-        return Standing(ABSENT)
-    wanted = artefact_identity(name, settings)
-    if record.identity.hash != wanted.hash:
-        return Standing(STALE, tuple(differences(record.identity, wanted)), record)
-    missing = lost(folder, record)
-    if missing:
-        return Standing(INCOMPLETE, (f"lost {', '.join(missing)}",), record)
-    if dict(record.read) != read_bytes(record.read, settings.results):
+    found = of_folder(record_folder(name, settings.results), lambda: artefact_identity(name, settings))
+    record = found.record
+    if found.state == DONE and record is not None and dict(record.read) != read_bytes(record.read, settings.results):
         return Standing(STALE, ("a run that it shows was made again with other bytes",), record)
-    return Standing(DONE, (), record)
+    return found
 
 
 def read_bytes(folders: Iterable[str], results: Path | str) -> dict[str, str]:

@@ -1,12 +1,12 @@
 """How a run of the study stands: absent, incomplete, stale (and why) or done. One answer for everyone who asks."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from mtcsirl.errors import UserError
-from mtcsirl.files.identity import Record, differences, lost, read_record, write_marker
+from mtcsirl.files.identity import Identity, Record, differences, lost, read_record, write_marker
 from mtcsirl.settings import Settings
 from mtcsirl.study.keys import Run, identity_of
 
@@ -25,20 +25,25 @@ class Standing:
 def standing(run: Run[Any], settings: Settings, results: Path | str | None = None) -> Standing:
     """Hold the record in the folder of ``run`` against what ``settings`` and today's code ask for."""
     results = Path(settings.results if results is None else results)
-    folder = results / run.folder
+    found = of_folder(results / run.folder, lambda: identity_of(run, settings))
+    return found if found.state != DONE or found.record is None else _over_its_inputs(run, found.record, results)
+
+
+def of_folder(folder: Path, identity: Callable[[], Identity]) -> Standing:
+    """What stands in ``folder``, without a look at its inputs; ``identity``, asked where a record is: what should."""
     try:
         record = read_record(folder)
     except UserError as error:
         return Standing(INCOMPLETE, (str(error),))
     if record is None:
         return Standing(ABSENT)
-    wanted = identity_of(run, settings)
+    wanted = identity()
     if record.identity.hash != wanted.hash:
         return Standing(STALE, tuple(differences(record.identity, wanted)), record)
     missing = lost(folder, record)
     if missing:
         return Standing(INCOMPLETE, (f"lost {', '.join(missing)}",), record)
-    return _over_its_inputs(run, record, results)
+    return Standing(DONE, (), record)
 
 
 def _over_its_inputs(run: Run[Any], record: Record, results: Path) -> Standing:
