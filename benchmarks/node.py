@@ -4,9 +4,9 @@
     python -m benchmarks.node --device cuda --workers 15
 
 Agents are experts of velocity on reach-wall in lockstep, at the desk scale and with the paper's settings; the share of
-the environment is the part of the time in which the learner waits for it. IRL is MT-CSIRL at the desk scale, which
-computes on the CPU; its steps are those of all T generators together. A scale costs the steps of all agents and
-generators of its plan over the best rate measured for them; demonstrations, scores and evaluations are left out.
+IRL is MT-CSIRL at the desk scale, its steps those of
+all T generators together. A scale costs the steps of all agents and generators of its plan over the best rate measured
+for them; demonstrations, scores and evaluations are left out.
 """
 
 import argparse
@@ -113,13 +113,17 @@ def agent_settings(settings: Settings, device: str) -> AgentRunSettings:
     )
 
 
-def reward(members: Sequence[tuple[str, int]], seconds: float, *, rollout: int = 500) -> Rate:
+def reward(
+    members: Sequence[tuple[str, int]], seconds: float, *, rollout: int = 500, device: str = "cpu", workers: int = 0
+) -> Rate:
     """MT-CSIRL on experts that never learned, without warm-up; ``rollout``: steps of an iteration."""
-    settings = irl_run(load(), "multi_task", {task for task, _ in members}, "mt_csirl")
+    settings = irl_run(
+        load(overrides=[f"sac.device={device}"]), "multi_task", {task for task, _ in members}, "mt_csirl"
+    )
     algorithm = settings.irl.model_copy(update={"warm_up_iterations": 0, "steps_per_iteration": rollout})
     changes = {"irl": algorithm, "demonstration_episodes": EPISODES, "scripted_steps": {}, "scripted_noise": 0.0}
     settings = settings.model_copy(update=changes)
-    policy = FusedSac(1, settings.sac, seeds=[0]).policy(0)
+    policy = FusedSac(1, settings.sac, seeds=[0], device="cpu").policy(0)
     with tempfile.TemporaryDirectory() as folder:
         files = []
         for task, target in members:
@@ -127,7 +131,7 @@ def reward(members: Sequence[tuple[str, int]], seconds: float, *, rollout: int =
             asked = DemonstrationRunSettings(episodes=EPISODES, episode_steps=rollout)
             frame = collect_demonstrations(policy, task, target, asked, seed=0, cs_reward="velocity")
             write_parquet(files[-1], frame)
-        trainer = irl.make_trainer("mt_csirl", "velocity", files, 0, settings)
+        trainer = irl.make_trainer("mt_csirl", "velocity", files, 0, settings, workers=workers)
 
     def turn() -> int:
         trainer.iterate()
@@ -177,7 +181,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
             rate = agents(count, agent_settings(settings, asked.device), asked.workers, asked.seconds)
             _print(f"{count} agents, {name} scale", rate)
             best[name] = max(best.get(name, 0.0), rate.steps)
-    generators = {count: reward(members(count), asked.seconds, rollout=asked.rollout) for count in asked.together}
+    of_irl = {"rollout": asked.rollout, "device": asked.device, "workers": asked.workers}
+    generators = {count: reward(members(count), asked.seconds, **of_irl) for count in asked.together}
     for count, rate in generators.items():
         _print(f"IRL of {count} generators, desk scale", rate)
     _print_costs(scales, best, max(rate.steps for rate in generators.values()))

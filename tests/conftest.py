@@ -6,10 +6,12 @@ from pathlib import Path
 import pytest
 import torch
 
+import mtcsirl.agents.sac
 from mtcsirl.cli import THREADS
 from mtcsirl.settings import SacSettings
 from mtcsirl.settings.runs import AgentRunSettings
 from mtcsirl.worlds.drawable import lacking
+from tests.claimed_device import ClaimedGenerator, ClaimedGpu
 
 for _name in THREADS:
     os.environ.setdefault(_name, "1")
@@ -45,3 +47,11 @@ def small_run() -> AgentRunSettings:
         evaluation={"episodes": 2, "episode_steps": 50},
         progress={"checkpoint_every": 100, "select_every": 100, "select_episodes": 1},
     )
+
+
+@pytest.fixture
+def claimed_gpu(monkeypatch: pytest.MonkeyPatch) -> ClaimedGpu:
+    """To be entered; CUDA graphs, which only a GPU can capture, are run as they are."""
+    monkeypatch.setattr(torch, "Generator", ClaimedGenerator)
+    monkeypatch.setattr(mtcsirl.agents.sac, "CudaGraph", lambda program: program)
+    return ClaimedGpu()

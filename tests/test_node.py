@@ -12,7 +12,7 @@ from mtcsirl.errors import UserError
 from mtcsirl.settings.loading import load
 from mtcsirl.settings.runs import baseline_run, expert_run, irl_run, transfer_run
 
-STAGES_ON_GPU = {"train_expert", "train_sac"}
+STAGES_ON_GPU = {"train_expert", "train_sac", "learn_reward", "transfer"}
 
 
 def test_the_benchmark_prints_a_rate_for_every_size_and_the_cost_of_both_scales(
@@ -42,12 +42,12 @@ def test_thirty_generators_are_thirty_pairs_of_task_and_target() -> None:
     assert all(target > 0 for _, target in node.members(30))
 
 
-def test_rewards_and_who_learns_from_them_stay_on_the_cpu() -> None:
+def test_every_run_that_learns_takes_the_device_of_the_study() -> None:
     settings = load(overrides=["sac.device=cuda"])
     assert baseline_run(settings, "reach").sac.device == "cuda"
     assert expert_run(settings, "reach", "velocity").sac.device == "cuda"
-    assert transfer_run(settings, "reach").sac.device == "cpu"
-    assert irl_run(settings, "multi_task", ["reach"], "mt_csirl").sac.device == "cpu"
+    assert transfer_run(settings, "reach").sac.device == "cuda"
+    assert irl_run(settings, "multi_task", ["reach"], "mt_csirl").sac.device == "cuda"
 
 
 def test_the_profile_shares_the_gpu_among_the_stages_that_use_it(checkout: Path) -> None:
@@ -61,19 +61,13 @@ def test_the_profile_shares_the_gpu_among_the_stages_that_use_it(checkout: Path)
     assert profile["rerun-triggers"] == default["rerun-triggers"]
 
 
-@pytest.mark.parametrize("verb", ["train-sac", "train-expert", "train-together"])
+@pytest.mark.parametrize("verb", ["train-sac", "train-expert", "transfer", "train-together"])
 def test_device_stands_for_its_settings_key(verb: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    key = {"train-sac": [], "train-expert": ["--cs-reward", "velocity"]}.get(verb)
+    velocity = ["--cs-reward", "velocity"]
+    key = {"train-sac": [], "train-expert": velocity, "transfer": [*velocity, "--reward", str(tmp_path)]}.get(verb)
     own = [] if key is None else [*key, "--task", "reach", "--seed", "0", "--output", str(tmp_path / "run")]
     assert cli.main([verb, *own, "--set", f"{'results' if not own else 'steps'}={tmp_path if not own else 9}",
                      "--device", "cuda:77"]) == 2  # fmt: skip
     assert "sac.device = 'cuda:77': this machine has" in capsys.readouterr().err
     assert cli.main([verb, *own, "--device", "gpu"]) == 2
     assert "must be cpu, cuda or cuda:INDEX" in capsys.readouterr().err
-
-
-def test_a_reward_on_a_gpu_is_refused_in_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    (tmp_path / "reward").mkdir()
-    given = ["--cs-reward", "velocity", "--task", "reach", "--seed", "0", "--output", str(tmp_path / "run")]
-    assert cli.main(["transfer", "--reward", str(tmp_path / "reward"), *given, "--set", "sac.device=cuda"]) == 2
-    assert "sac.device = 'cuda': transfer does not read this key" in capsys.readouterr().err

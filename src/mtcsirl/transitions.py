@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, NamedTuple
 
 if TYPE_CHECKING:
+    import torch
     from torch import Tensor
 
 
@@ -21,6 +22,10 @@ class Transitions(NamedTuple):
     action: Tensor
     next_observation: Tensor
     task_reward: Tensor
+
+    def to(self, device: torch.device | str) -> Transitions:
+        """The same on another device; not a copy where they are there already."""
+        return Transitions(*(part.to(device) for part in self))
 
 
 RewardFunction = Callable[[Transitions], "Tensor"]

@@ -150,6 +150,7 @@ def _learn_reward(verbs: Verbs) -> None:
     )
     add_workers(verb)
     add_run_settings(verb)
+    add_device(verb)
     add_output(verb)
     add_identity(verb)
 
@@ -180,6 +181,7 @@ def _transfer(verbs: Verbs) -> None:
     )
     add_agent(verb)
     add_run_settings(verb)
+    add_device(verb)
     add_output(verb)
     add_identity(verb)
 

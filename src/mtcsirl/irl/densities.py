@@ -36,9 +36,10 @@ class Densities:
         """``demonstrations`` [T, N]; ``policies``: K; ``steps``: environment steps of each policy's rollout."""
         tasks, (observation, action) = len(demonstrations.action), (x.shape[-1] for x in demonstrations[:2])
         self._demonstrations, self._policies, self._steps = demonstrations, policies, steps
+        self._device = demonstrations.action.device
         self._bounds = sac.min_log_std, sac.max_log_std
         self._uniform = -action * math.log(2.0)
-        self._stack = NetworkStack(tasks, (observation, *sac.hidden_sizes, 2 * action))
+        self._stack = NetworkStack(tasks, (observation, *sac.hidden_sizes, 2 * action), device=self._device)
         self._workspace = self._stack.workspace(ROWS)
         self._actors: list[Tensor] = []
         self._expert: list[Tensor] = []
@@ -80,7 +81,7 @@ class Densities:
         """log pi(a|s) [T, n] of transitions [T, n]."""
         tasks, count = transitions.task_reward.shape
         if parameters.isnan().any():
-            return torch.full((tasks, count), self._uniform)
+            return torch.full((tasks, count), self._uniform, device=self._device)
         self._stack.parameters.copy_(parameters)
         parts = []
         for start in range(0, count, ROWS):
@@ -98,7 +99,8 @@ class Densities:
     def load_state(self, state: Mapping[str, Tensor]) -> None:
         """Restore what ``state`` gave."""
         self._actors, self._expert, self._generator = (
-            [row.clone() for row in state.get(name, ())] for name in ("actors", "expert", "generator")
+            [row.to(self._device, copy=True) for row in state.get(name, ())]
+            for name in ("actors", "expert", "generator")
         )
 
 

@@ -32,7 +32,7 @@ def episode_rows(world: World, rollout: Transitions, flags: Flags, first_step: i
     ``first_step``: environment steps of each generator before it; an episode's row stands at its last step. An episode
     in which the simulation diverged has failed and says how often.
     """
-    _, action, following, task_reward = (part.numpy() for part in rollout)
+    _, action, following, task_reward = (part.numpy() for part in rollout.to("cpu"))
     steps, rows = flags.success.shape[1], []
     for start in range(0, steps, episode_steps):
         end = min(start + episode_steps, steps)

@@ -60,5 +60,5 @@ def collect(environments: Environments, act: Act, steps: int, episode_steps: int
 
 def gather(transitions: Transitions, index: Tensor) -> Transitions:
     """Rows ``index`` [T, B] of transitions [T, N]: transitions [T, B]."""
-    task = torch.arange(index.shape[0]).unsqueeze(1)
+    task = torch.arange(index.shape[0], device=index.device).unsqueeze(1)
     return Transitions(*(part[task, index] for part in transitions))

@@ -103,7 +103,13 @@ def make_trainer(
         truth=ground_truth(cs_reward, observation),
         measure_episode=functools.partial(measure_episode, observation=observation),
     )
-    setup = Setup(irl=settings.irl, tasks=len(experts.members), seed=seed, discount=settings.sac.discount)
+    setup = Setup(
+        irl=settings.irl,
+        tasks=len(experts.members),
+        seed=seed,
+        discount=settings.sac.discount,
+        device=settings.sac.device,
+    )
     return IrlTrainer(make_method(method, setup), world, experts.transitions, settings, seed)
 
 
@@ -213,7 +219,7 @@ def _samples(trainer: IrlTrainer) -> pd.DataFrame:
     length = trainer.irl.steps_per_iteration
     steps = min(SAMPLED_ROLLOUTS * length, trainer.replay.size)
     seen = OBSERVATION_MAPS[trainer.settings.environment.observation]
-    latest = trainer.replay.latest(steps)
+    latest = trainer.replay.latest(steps).to("cpu")
     frames = []
     for index, (task, target) in enumerate(trainer.world.members):
         own = Transitions(*(part[index] for part in latest))

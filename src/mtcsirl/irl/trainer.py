@@ -57,23 +57,23 @@ class IrlTrainer:
         self.method, self.world, self.settings = method, world, settings
         self.irl, self.seed = settings.irl, seed
         self.iteration = 0
-        self._demonstrations = demonstrations
+        self._device = torch.device(settings.sac.device)
+        self._demonstrations = demonstrations.to(self._device)
         tasks, steps = len(world.members), self.irl.steps_per_iteration
         *seeds, own = (int(n) for n in np.random.SeedSequence(seed).generate_state(tasks + 1))
         state, action = demonstrations.observation.shape[-1], demonstrations.action.shape[-1]
         self.sac = make_learner(tasks, self._first_sac(), seeds, observation_size=state, action_size=action)
         capacity = min(self.irl.generator_memory, self.iterations * steps)
-        self.replay = Replay(seeds, capacity, observation_size=state, action_size=action)
+        self.replay = Replay(seeds, capacity, observation_size=state, action_size=action, device=self._device)
         self._random_actions = Streams(seeds, Purpose.RANDOM_ACTIONS, (action,), uniform)
         maximum = R_MAX if self.irl.curriculum_maximum == "task" else demonstrations.task_reward.mean(dim=1)
         weighted = [self.irl.curriculum and method.uses_curriculum] * tasks
         self.alpha = Alpha([self.irl.cs_weight] * tasks, weighted, self.irl.curriculum_window, maximum)
         """The weight of f in each generator's reward [T]."""
-        mixed = self.irl.generator_replay if self.irl.logit_density == "mixture" else 1
-        self.densities = Densities(demonstrations, settings.sac, policies=mixed, steps=steps)
-        self._policies_mixed = mixed
+        self._policies_mixed = self.irl.generator_replay if self.irl.logit_density == "mixture" else 1
+        self.densities = Densities(self._demonstrations, settings.sac, policies=self._policies_mixed, steps=steps)
         self._scripted = self._explorers(seeds)
-        self.random = torch.Generator().manual_seed(own)
+        self.random = torch.Generator(self._device).manual_seed(own)
         self._paying: dict[str, RewardNetwork] = {}
         self._centres: dict[str, Tensor] = {}
         self.curve: list[Row] = []
@@ -162,7 +162,7 @@ class IrlTrainer:
         if self._acts_randomly:
             action = 2.0 * self._random_actions.draw(self.replay.size).numpy() - 1.0
         else:
-            action = self.sac.act(torch.from_numpy(observation).float()).numpy()
+            action = self.sac.act(torch.from_numpy(observation).float().to(self._device)).cpu().numpy()
         self._scripted.replace(action, observation, self.replay.size)
         self._stop_at("the action", broken_rows(action))
         return action
@@ -179,7 +179,7 @@ class IrlTrainer:
         if self._warming_up:
             return task_reward
         learned = {name: network(transitions) - self._centres[name] for name, network in self._paying.items()}
-        return self.method.policy_reward(task_reward, learned, self.alpha().unsqueeze(1))
+        return self.method.policy_reward(task_reward, learned, self.alpha().to(self._device).unsqueeze(1))
 
     def centre(self, network: RewardNetwork) -> Tensor:
         """The mean of a learned reward over each generator's last transitions [T, 1], or 0 without centring.
@@ -188,7 +188,7 @@ class IrlTrainer:
         times (1 / (1 - gamma)) its value: f starts near log pi - r_task, about -13, whatever it has to say.
         """
         if not self.irl.centre:
-            return torch.zeros(len(self.world.members), 1)
+            return torch.zeros(len(self.world.members), 1, device=self._device)
         latest = self.replay.latest(min(CENTRED, self.replay.size))
         return network(latest).mean(dim=1, keepdim=True)
 
@@ -248,7 +248,7 @@ class IrlTrainer:
         ):
             log_pi = clamp_log_pi(log_pi, self.irl.discriminator.log_pi_clamp)
             shape = count, len(log_pi), minibatch
-            index = torch.randint(log_pi.shape[1], shape, generator=self.random)
+            index = torch.randint(log_pi.shape[1], shape, generator=self.random, device=self._device)
             sides.append([(self._scaled(gather(held, one)), log_pi.gather(1, one)) for one in index])
         return [
             Batch(expert, generator, expert_log_pi, generator_log_pi, temperature)

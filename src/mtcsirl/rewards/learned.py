@@ -2,10 +2,11 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+import torch
 from torch import Tensor
 
 from mtcsirl.errors import UserError
@@ -48,6 +49,11 @@ class LearnedReward:
         """The task that it was learned from, or "all"; where it does not say, what its members make of it."""
         tasks = sorted({task for task, _ in self.members})
         return str(self.about.get("source", tasks[0] if len(tasks) == 1 else "all"))
+
+    def to(self, device: torch.device | str) -> "LearnedReward":
+        """A copy that computes on another device."""
+        task = None if self.task_network is None else self.task_network.to(device)
+        return replace(self, network=self.network.to(device), task_network=task)
 
     def __call__(self, transitions: Transitions) -> Tensor:
         """The learned reward f [...] of transitions [...]."""

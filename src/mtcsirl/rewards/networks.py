@@ -161,9 +161,13 @@ class RewardNetwork:
     """K learned rewards f = output_scale x value with the parameters [K, P]."""
 
     def __init__(
-        self, architecture: Mapping[str, Any], members: int = 1, random: torch.Generator | None = None
+        self,
+        architecture: Mapping[str, Any],
+        members: int = 1,
+        random: torch.Generator | None = None,
+        device: torch.device | str = "cpu",
     ) -> None:
-        """``architecture`` is what ``architecture`` below holds; ``random`` draws the initial parameters.
+        """``architecture`` is what ``architecture`` below holds; ``random``, on the CPU, draws the initial parameters.
 
         Raises:
             UserError: the architecture lacks a key or names an unknown kind.
@@ -173,7 +177,7 @@ class RewardNetwork:
         self._body = _body(self.architecture)
         self.output_scale = float(architecture["output_scale"])
         random = random or torch.Generator().manual_seed(0)
-        self.parameters = self._body.initial(members, random).requires_grad_()
+        self.parameters = self._body.initial(members, random).to(device).requires_grad_()
 
     def output(self, inputs: Tensor, random: torch.Generator | None = None) -> Output:
         """Inputs [..., I] -> value, potential and information [...]; with K > 1 the inputs lead with K."""
@@ -193,14 +197,18 @@ class RewardNetwork:
         with torch.no_grad():
             return self.output_scale * self.output(network_inputs(transitions)).value
 
+    def to(self, device: torch.device | str) -> "RewardNetwork":
+        """A copy on another device."""
+        return self.from_parameters(self.architecture, self.parameters.detach().to(device))
+
     def member(self, index: int) -> "RewardNetwork":
         """A copy of one of the K rewards as a network of its own."""
         return self.from_parameters(self.architecture, self.parameters[index : index + 1])
 
     @classmethod
     def from_parameters(cls, architecture: Mapping[str, Any], parameters: Tensor) -> "RewardNetwork":
-        """Rebuild networks from parameters [K, P] (copied); ValueError if their number does not fit."""
-        network = cls(architecture, members=parameters.shape[0])
+        """Networks from parameters [K, P], copied on their device; ValueError if their number does not fit."""
+        network = cls(architecture, members=parameters.shape[0], device=parameters.device)
         if network.parameters.shape != parameters.shape:
             raise ValueError(f"expected {network.parameters.shape[1]} parameters, got {parameters.shape[1]}")
         with torch.no_grad():

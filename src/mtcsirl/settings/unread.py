@@ -25,8 +25,6 @@ _OF_CS_REWARD = (
 )
 _OF_SELECTION = ("progress.select_every", "progress.select_episodes", "progress.select_training_episodes")
 _OF_EXPERT_GATE = ("gates.expert_velocity", "gates.expert_action_norm")
-_OF_DEVICE = ("sac.device",)
-"""Learned rewards compute on the CPU: a study whose sac.device is a GPU trains experts and baselines there."""
 _OF_AGENT = ("sac.updates_per_step", "progress.tensorboard")
 _OF_PERCEPTRON = ("irl.discriminator.hidden_sizes", "irl.discriminator.gradient_penalty")
 _OF_BOTTLENECK = (
@@ -62,9 +60,9 @@ def unread(stage: str, *, cs_reward: str = "", method: str = "") -> tuple[str, .
     if stage == "collect_demonstrations":
         return (*others, "environment.observation", "gates.generator")  # stored raw, seen as the expert's file says
     if stage == "transfer":
-        return (*_OF_SELECTION, *_OF_EXPERT_GATE, *_OF_DEVICE, "gates.generator")
+        return (*_OF_SELECTION, *_OF_EXPERT_GATE, "gates.generator")
     if stage == "learn_reward":
-        return (*_OF_SELECTION, *_OF_EXPERT_GATE, *_OF_AGENT, *_OF_DEVICE, *METHODS.get(method, ()))
+        return (*_OF_SELECTION, *_OF_EXPERT_GATE, *_OF_AGENT, *METHODS.get(method, ()))
     return ()
 
 

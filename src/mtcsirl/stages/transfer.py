@@ -36,7 +36,7 @@ def transfer_job(settings: AgentRunSettings, reward: Path, agent: NewAgent) -> A
     Raises:
         UserError: the reward was learned from experts of another cs-reward or on another observation.
     """
-    learned = load_learned_reward(reward)
+    learned = load_learned_reward(reward).to(settings.sac.device)
     check_learned(learned, reward, cs_reward=agent.cs_reward, observation=settings.environment.observation)
     own = learned.task_reward(agent.task, agent.target) if agent.task_reward == "learned" else None
     return AgentJob(

@@ -29,6 +29,7 @@ class Setup:
     discount: float = 0.99
     observation_size: int = 39
     action_size: int = 4
+    device: torch.device | str = "cpu"
 
     def perceptron(self) -> dict[str, Any]:
         """The architecture of f: a ReLU perceptron."""
@@ -63,8 +64,8 @@ class Setup:
         self, architecture: dict[str, Any], loss: Adversarial, rewards: int, stream: int
     ) -> Discriminator:
         weights, noise = np.random.SeedSequence((self.seed, stream)).generate_state(2)
-        network = RewardNetwork(architecture, rewards, torch.Generator().manual_seed(int(weights)))
-        random = torch.Generator().manual_seed(int(noise))
+        network = RewardNetwork(architecture, rewards, torch.Generator().manual_seed(int(weights)), self.device)
+        random = torch.Generator(self.device).manual_seed(int(noise))
         return Discriminator(network, loss, self.irl.discriminator.learning_rate, random)
 
 
