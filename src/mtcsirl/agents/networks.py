@@ -2,8 +2,7 @@
 
 A network computes the same bits alone as among others. Libraries choose a kernel by where a matrix begins in memory and
 treat the last numbers of a vector differently, so every network's parameters and every slice of a workspace begin at a
-multiple of `ALIGNED` numbers; and the one product whose kernel depends on the number of networks, a single column for a
-single network, is computed twice (`_column`).
+multiple of `ALIGNED` numbers; and products are taken network by network (`_multiply`).
 """
 
 from __future__ import annotations
@@ -11,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
 
+import numpy as np
 import torch
 from torch import Tensor
 
@@ -45,12 +45,17 @@ def _slices(like: Tensor, networks: int, rows: int, size: int) -> Tensor:
     return flat[:, : rows * size].view(networks, rows, size)
 
 
-def _column(bias: Tensor, inputs: Tensor, weight: Tensor, out: Tensor) -> None:
-    """bias + inputs weight of one network with one output, as two networks compute it: a lone one takes a kernel of
-    its own, which adds in another order."""
-    pair = [tensor.expand(2, -1, -1) for tensor in (bias, inputs, weight)]
-    both = _slices(out, 2, *out.shape[1:])
-    out.copy_(torch.baddbmm(*pair, out=both)[:1])
+def _multiply(left: Tensor, right: Tensor, out: Tensor) -> None:
+    """left [G, n, k] right [G, k, m] -> out [G, n, m].
+
+    On the CPU by numpy, whose OpenBLAS multiplies one pair of matrices after the other, and with AVX-512 on processors
+    of any maker (files/processor.py): torch's MKL has AVX2 alone on those that are not Intel's, half of their speed.
+    """
+    if out.is_cpu:
+        with np.errstate(over="ignore", invalid="ignore"):  # agents/finite.py looks for what is not finite
+            np.matmul(left.numpy(), right.numpy(), out=out.numpy())
+    else:
+        torch.bmm(left, right, out=out)
 
 
 class NetworkStack:
@@ -105,16 +110,14 @@ class NetworkStack:
         for layer, (weight, bias) in enumerate(zip(self._transposed, self.biases, strict=True)):
             if layer > 0:
                 activations[layer].relu_()
-            if bias.numel() == 1:
-                _column(bias, activations[layer], weight, activations[layer + 1])
-            else:
-                torch.baddbmm(bias, activations[layer], weight, out=activations[layer + 1])
+            _multiply(activations[layer], weight, activations[layer + 1])
+            activations[layer + 1].add_(bias)
         return activations[-1]
 
     def backward(self, output_gradient: Tensor, workspace: Workspace) -> None:
         """Write dL/dW and dL/db of every layer into `gradient`, given dL/d output [G, B, out]."""
         for layer, delta in self._deltas(output_gradient, workspace):
-            torch.bmm(delta.transpose(1, 2), workspace.activations[layer], out=self._weight_gradients[layer])
+            _multiply(delta.transpose(1, 2), workspace.activations[layer], self._weight_gradients[layer])
             torch.sum(delta, dim=1, keepdim=True, out=self._bias_gradients[layer])
 
     def input_gradient(self, output_gradient: Tensor, workspace: Workspace, columns: slice) -> Tensor:
@@ -129,8 +132,12 @@ class NetworkStack:
         yield len(self.weights) - 1, delta
         for layer in range(len(self.weights) - 1, 0, -1):
             # The product with a single column is an outer one, which multiplies faster than a matrix product.
-            product = torch.mul if delta.shape[-1] == 1 else torch.bmm
-            delta = product(delta, self.weights[layer], out=workspace.deltas[layer])
+            product = workspace.deltas[layer]
+            if delta.shape[-1] == 1:
+                torch.mul(delta, self.weights[layer], out=product)
+            else:
+                _multiply(delta, self.weights[layer], product)
+            delta = product
             relu_backward = torch.ops.aten.threshold_backward.grad_input
             relu_backward(delta, workspace.activations[layer], 0.0, grad_input=delta)
             yield layer - 1, delta
