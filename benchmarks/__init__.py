@@ -1,8 +1,1 @@
 """Measured ratios against the peers; `make bench` runs all of them."""
-
-import os
-
-from mtcsirl.files.processor import kernels
-
-for _name, _value in kernels().items():  # before anything loads numpy, as every job does
-    os.environ.setdefault(_name, _value)

@@ -37,6 +37,8 @@ class ClaimedGpu(TorchFunctionMode):
         name = getattr(func, "__name__", "")
         if func == Tensor.device.__get__:
             return torch.device("cuda" if on_gpu(args[0]) else "cpu")
+        if func == Tensor.is_cpu.__get__:
+            return not on_gpu(args[0])
         if name in ("to", "cpu"):
             return _move(func, args, kwargs)
         if name == "copy_":  # from any device to any other

@@ -19,7 +19,6 @@ from mtcsirl.commands import archive, artefacts, diagnostics, doctor, export, st
 from mtcsirl.errors import UserError
 from mtcsirl.extensions import load_from_environment
 from mtcsirl.files import console, stop
-from mtcsirl.files.processor import kernels
 from mtcsirl.worlds.variables import backend
 
 THREADS = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS")
@@ -66,8 +65,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     Exit code 0; 2 for what a user can mend (one line on stderr); 130 or 143 when stopped; 1 for a bug of this program.
     """
-    for name, value in (dict.fromkeys(THREADS, "1") | kernels()).items():
-        os.environ.setdefault(name, value)
+    for name in THREADS:
+        os.environ.setdefault(name, "1")
     gc.set_threshold(50_000, 20, 20)  # the collector's passes over what imports leave took a fifth of a job's start-up
     console.protect()
     logging.basicConfig(level=logging.INFO, format="%(asctime)s %(message)s", datefmt="%H:%M:%S", stream=sys.stderr)

@@ -4,6 +4,7 @@ import pytest
 import torch
 from torch.nn.functional import linear, relu
 
+from mtcsirl.agents import products
 from mtcsirl.agents.networks import NetworkStack
 from mtcsirl.agents.optimiser import FlatAdam
 
@@ -14,6 +15,13 @@ def stack() -> NetworkStack:
     for network in range(3):
         stack.initialise(network, torch.Generator().manual_seed(network))
     return stack
+
+
+@pytest.fixture(params=["numpy", "torch"])
+def library(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> str:
+    """Either library, whichever processor this is."""
+    monkeypatch.setattr(products, "BY_NUMPY", request.param == "numpy")
+    return request.param
 
 
 def plain_forward(stack, network, weights, inputs):
@@ -27,7 +35,7 @@ def leaves(stack, network):
     return [t.clone().requires_grad_() for w, b in pairs for t in (w[network], b[network, 0])]
 
 
-def test_forward_and_gradients_are_those_of_autograd(stack):
+def test_forward_and_gradients_are_those_of_autograd(stack, library):
     inputs = torch.randn(3, 5, 7, dtype=torch.float64, requires_grad=True)
     output_gradient = torch.randn(3, 5, 2, dtype=torch.float64)
     workspace = stack.workspace(5)
@@ -66,3 +74,41 @@ def test_flat_adam_is_adam():
         optimiser.step()
         reference.step()
     torch.testing.assert_close(ours, theirs.detach(), rtol=1e-6, atol=1e-7)
+
+
+@pytest.mark.parametrize("sizes", [(43, 256, 256, 1), (39, 256, 256, 8), (5, 3, 1)])
+def test_a_network_has_the_same_bits_alone_and_among_others(library, sizes):
+    """Outputs, gradients of parameters and of inputs; and both libraries round no worse than float32 has to."""
+    rows, places = 64, slice(sizes[0] - 2, None)
+    made = {}
+    for networks in ((0, 1, 2), (1,), (2,)):
+        stack = NetworkStack(len(networks), sizes)
+        exact = NetworkStack(len(networks), sizes, dtype=torch.float64)
+        inputs, outer = (torch.empty(len(networks), rows, size) for size in (sizes[0], sizes[-1]))
+        for place, network in enumerate(networks):
+            generator = torch.Generator().manual_seed(network)
+            stack.initialise(place, generator)
+            inputs[place].normal_(generator=generator)
+            outer[place].normal_(generator=generator)
+        exact.parameters.copy_(stack.parameters)
+        found, right = (
+            passes(one, inputs.to(one.parameters), outer.to(one.parameters), places) for one in (stack, exact)
+        )
+        for ours, theirs in zip(found, right, strict=True):
+            assert (ours - theirs).norm() <= 1e-6 * theirs.norm()
+        made |= {(len(networks), network): [part[place] for part in found] for place, network in enumerate(networks)}
+    for network in (1, 2):
+        assert all(torch.equal(*pair) for pair in zip(made[1, network], made[3, network], strict=True))
+
+
+def passes(stack, inputs, outer, places):
+    workspace = stack.workspace(inputs.shape[1])
+    outputs = stack.forward(inputs, workspace).clone()
+    stack.backward(outer, workspace)
+    return outputs, stack.gradient.clone(), stack.input_gradient(outer, workspace, places).clone()
+
+
+def test_the_library_follows_the_maker_of_the_processor():
+    assert products.by_numpy("vendor_id\t: AuthenticAMD\nflags\t: avx2")
+    assert not products.by_numpy("vendor_id\t: GenuineIntel\nflags\t: avx2 avx512f")
+    assert not products.by_numpy("")

@@ -2,7 +2,7 @@
 
 A network computes the same bits alone as among others. Libraries choose a kernel by where a matrix begins in memory and
 treat the last numbers of a vector differently, so every network's parameters and every slice of a workspace begin at a
-multiple of `ALIGNED` numbers; and products are taken network by network (`_multiply`).
+multiple of `ALIGNED` numbers (agents/products.py).
 """
 
 from __future__ import annotations
@@ -10,17 +10,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
 
-import numpy as np
 import torch
 from torch import Tensor
 
-ALIGNED = 32
-"""Numbers: two of the widest vectors (AVX-512, float32), which torch's loops take at a time."""
-
-
-def aligned(count: int) -> int:
-    """The least multiple of `ALIGNED` that holds `count` numbers."""
-    return -(-count // ALIGNED) * ALIGNED
+from mtcsirl.agents.products import affine, aligned, multiply, slices
 
 
 class Workspace:
@@ -32,30 +25,11 @@ class Workspace:
 
     def __init__(self, activations: list[Tensor]) -> None:
         self.activations = activations
-        self.deltas = [_slices(tensor, *tensor.shape) for tensor in activations]
+        self.deltas = [slices(tensor, *tensor.shape) for tensor in activations]
 
     def first_rows(self, rows: int) -> Workspace:
         """The same pass, for a backward pass through its first rows alone."""
         return Workspace([tensor[:, :rows] for tensor in self.activations])
-
-
-def _slices(like: Tensor, networks: int, rows: int, size: int) -> Tensor:
-    """Memory [G, rows, size] whose G slices are contiguous and aligned each."""
-    flat = like.new_empty(networks, aligned(rows * size))
-    return flat[:, : rows * size].view(networks, rows, size)
-
-
-def _multiply(left: Tensor, right: Tensor, out: Tensor) -> None:
-    """left [G, n, k] right [G, k, m] -> out [G, n, m].
-
-    On the CPU by numpy, whose OpenBLAS multiplies one pair of matrices after the other, and with AVX-512 on processors
-    of any maker (files/processor.py): torch's MKL has AVX2 alone on those that are not Intel's, half of their speed.
-    """
-    if out.is_cpu:
-        with np.errstate(over="ignore", invalid="ignore"):  # agents/finite.py looks for what is not finite
-            np.matmul(left.numpy(), right.numpy(), out=out.numpy())
-    else:
-        torch.bmm(left, right, out=out)
 
 
 class NetworkStack:
@@ -100,7 +74,7 @@ class NetworkStack:
 
     def workspace(self, minibatch: int) -> Workspace:
         """Memory for passes of this many rows per network."""
-        return Workspace([_slices(self.parameters, len(self.parameters), minibatch, size) for size in self.sizes])
+        return Workspace([slices(self.parameters, len(self.parameters), minibatch, size) for size in self.sizes])
 
     def forward(self, inputs: Tensor, workspace: Workspace) -> Tensor:
         """inputs [G, B, in] -> outputs [G, B, out]; the workspace keeps every layer for the backward pass."""
@@ -110,14 +84,13 @@ class NetworkStack:
         for layer, (weight, bias) in enumerate(zip(self._transposed, self.biases, strict=True)):
             if layer > 0:
                 activations[layer].relu_()
-            _multiply(activations[layer], weight, activations[layer + 1])
-            activations[layer + 1].add_(bias)
+            affine(bias, activations[layer], weight, activations[layer + 1])
         return activations[-1]
 
     def backward(self, output_gradient: Tensor, workspace: Workspace) -> None:
         """Write dL/dW and dL/db of every layer into `gradient`, given dL/d output [G, B, out]."""
         for layer, delta in self._deltas(output_gradient, workspace):
-            _multiply(delta.transpose(1, 2), workspace.activations[layer], self._weight_gradients[layer])
+            multiply(delta.transpose(1, 2), workspace.activations[layer], self._weight_gradients[layer])
             torch.sum(delta, dim=1, keepdim=True, out=self._bias_gradients[layer])
 
     def input_gradient(self, output_gradient: Tensor, workspace: Workspace, columns: slice) -> Tensor:
@@ -132,12 +105,11 @@ class NetworkStack:
         yield len(self.weights) - 1, delta
         for layer in range(len(self.weights) - 1, 0, -1):
             # The product with a single column is an outer one, which multiplies faster than a matrix product.
-            product = workspace.deltas[layer]
-            if delta.shape[-1] == 1:
-                torch.mul(delta, self.weights[layer], out=product)
-            else:
-                _multiply(delta, self.weights[layer], product)
-            delta = product
+            out = workspace.deltas[layer]
+            column = delta.shape[-1] == 1
+            delta = (
+                torch.mul(delta, self.weights[layer], out=out) if column else multiply(delta, self.weights[layer], out)
+            )
             relu_backward = torch.ops.aten.threshold_backward.grad_input
             relu_backward(delta, workspace.activations[layer], 0.0, grad_input=delta)
             yield layer - 1, delta

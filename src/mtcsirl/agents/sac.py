@@ -22,8 +22,9 @@ from torch import Tensor
 from mtcsirl.agents.finite import broken_agents
 from mtcsirl.agents.gaussian import SquashedSample, squashed_log_prob, squashed_sample, squashed_sample_gradient
 from mtcsirl.agents.graph import CudaGraph
-from mtcsirl.agents.networks import ALIGNED, NetworkStack, Workspace
+from mtcsirl.agents.networks import NetworkStack, Workspace
 from mtcsirl.agents.optimiser import FlatAdam
+from mtcsirl.agents.products import ALIGNED
 from mtcsirl.agents.streams import Purpose, Streams
 from mtcsirl.episodes.policy import Policy
 
@@ -75,7 +76,7 @@ class FusedSac:
 
         fixed = settings.temperature != "automatic"
         initial = float(settings.temperature) if fixed else settings.initial_temperature
-        # One number of each row is used: all of it is aligned as networks are (agents/networks.py).
+        # One number of each row is used: all of it is aligned as networks are (agents/products.py).
         self._log_temperatures = torch.full((agents, ALIGNED), initial, **self._like).log_()
         self._log_temperature_gradients = torch.zeros_like(self._log_temperatures)
         self.log_temperature = self._log_temperatures[:, 0]

@@ -35,7 +35,7 @@ def commit() -> str:
 
 
 def machine() -> dict[str, Any]:
-    """Processor, cores and operating system."""
+    """Processor, cores, the kernels that numpy's OpenBLAS was asked for, and operating system."""
     model = platform.processor()
     cpuinfo = Path("/proc/cpuinfo")
     if cpuinfo.is_file():
@@ -46,6 +46,7 @@ def machine() -> dict[str, Any]:
     return {
         "processor": model,
         "cores": os.cpu_count(),
+        "openblas": os.environ.get("OPENBLAS_CORETYPE", "its own choice"),
         "system": platform.platform(),
         "python": platform.python_version(),
     }
