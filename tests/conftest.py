@@ -19,6 +19,11 @@ CHECKOUT = Path(__file__).resolve().parents[1]
 needs_rendering = pytest.mark.skipif(lacking() is not None, reason=str(lacking()))
 
 
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Slow tests first: where several processes share the files, none waits for the last slow one."""
+    items.sort(key=lambda item: item.get_closest_marker("slow") is None)
+
+
 def pytest_collection_finish() -> None:
     """As in a job, the collector leaves alone what imports made: to look through it took a fifth of all time."""
     gc.freeze()
