@@ -15,7 +15,8 @@ from mtcsirl.settings.template import keys
 from mtcsirl.settings.unread import sliced, unread
 from tests.words import learn_reward
 
-pytestmark = pytest.mark.slow
+# whatever is run here hundreds of times has tests of its own: without coverage, a third of the time
+pytestmark = [pytest.mark.slow, pytest.mark.no_cover]
 
 NEUTRAL = {
     "progress.checkpoint_every": "how often a run can resume, not what it computes",

@@ -1,6 +1,7 @@
 """Snakemake with its libraries loaded: each command is done by a fork of this process, which saves half of its time.
 
 The process has loaded nothing of this package, so that every command reads the sources as they stand, edited or not.
+Where nothing is edited it may have the package loaded too, with the code of all stages and pages hashed.
 """
 
 import json
@@ -14,13 +15,14 @@ from typing import NoReturn
 
 
 class Loaded:
-    """Such a process, for commands that find the package in ``sources``."""
+    """Such a process, for commands that find the package in ``sources``; what they print passes by files ``said``."""
 
-    def __init__(self, sources: Path, said: Path) -> None:
+    def __init__(self, sources: Path, said: Path, *, package: bool = False) -> None:
         self._said = said
         environment = os.environ | {"PYTHONPATH": str(sources), "PYTHONDONTWRITEBYTECODE": "1"}
+        command = [sys.executable, __file__, *["package"][: int(package)]]
         self._process = subprocess.Popen(
-            [sys.executable, __file__], env=environment, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+            command, env=environment, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
         )
 
     def snakemake(self, words: Sequence[str], cwd: Path) -> subprocess.CompletedProcess[str]:
@@ -33,8 +35,10 @@ class Loaded:
         code = int(self._process.stdout.readline())
         return subprocess.CompletedProcess(list(words), code, out.read_text(), err.read_text())
 
-    def close(self) -> None:
-        """End the process."""
+    def __enter__(self) -> "Loaded":
+        return self
+
+    def __exit__(self, *error: object) -> None:
         self._process.communicate()
 
 
@@ -47,11 +51,21 @@ def _serve() -> None:
     import snakemake.scheduling.job_scheduler  # noqa: F401
 
     assert not [name for name in sys.modules if "mtcsirl" in name], "the package is loaded by each command"
+    if sys.argv[1:] == ["package"]:
+        _load_the_package()
     for line in sys.stdin:
         child = os.fork()
         if not child:
             _do(*json.loads(line))
         print(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), flush=True)
+
+
+def _load_the_package() -> None:
+    from mtcsirl.settings.loading import load
+    from mtcsirl.study import status  # noqa: F401
+    from mtcsirl.study.artefacts import artefact_identity
+
+    artefact_identity("report", load(scale="smoke"))
 
 
 def _do(words: list[str], cwd: str, out: str, err: str) -> NoReturn:

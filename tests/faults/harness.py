@@ -30,6 +30,7 @@ def fork(work: Callable[[], object]) -> int:
         return child
     code = 1
     try:
+        sys.settrace(None)  # coverage would slow the child down and be lost with it
         nothing = os.open(os.devnull, os.O_WRONLY)
         os.dup2(nothing, 1)
         os.dup2(nothing, 2)
