@@ -50,9 +50,9 @@ quick: setup  ## what one runs before each commit, under two minutes on two idle
 	ruff format --check
 	pytest -n $(CORES) --dist loadfile -m "not slow and not dag" --ignore tests/dag
 
-test: setup  ## all tests, with coverage; the smoke DAG comes last, as it uses the cores itself
-	pytest -n $(CORES) --dist loadfile -m "not dag" --cov
-	pytest -m dag
+test: setup  ## all tests, with coverage; those that run the smoke DAG come last, as it uses the cores itself
+	pytest -n $(CORES) --dist loadfile --no-loadscope-reorder -m "not dag" --cov
+	pytest -n $(CORES) --dist loadgroup -m dag
 
 lint: setup  ## formatting, lint and types, all of which must be clean
 	ruff check

@@ -13,8 +13,10 @@ from mtcsirl.names import METHODS
 from mtcsirl.settings.runs import AgentRunSettings, DemonstrationRunSettings, IrlRunSettings, ScoreRunSettings
 from mtcsirl.settings.template import keys
 from mtcsirl.settings.unread import sliced, unread
+from tests.words import learn_reward
 
-pytestmark = pytest.mark.slow
+# whatever is run here hundreds of times has tests of its own: without coverage, a third of the time
+pytestmark = [pytest.mark.slow, pytest.mark.no_cover]
 
 NEUTRAL = {
     "progress.checkpoint_every": "how often a run can resume, not what it computes",
@@ -217,20 +219,8 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
         expert = ("--expert", str(folder / task / "expert"))
         make(COLLECT | {"episode_steps": 24}, f"{task}/shown", "collect-demonstrations", *expert, *key, *cs)
     make(AGENT | {"steps": 60}, "sac", "train-sac", *KEY)
-    shown = ("--demonstrations", str(folder / "reach/shown/demonstrations.parquet"))
     irl = sliced(IrlRunSettings.model_validate(IRL), unread("learn_reward", method="mt_csirl"))
-    make(
-        irl.model_dump(mode="json"),
-        "irl",
-        "learn-reward",
-        "--method",
-        "mt_csirl",
-        "--cs-reward",
-        "velocity",
-        "--seed",
-        "0",
-        *shown,
-    )
+    make(irl.model_dump(mode="json"), "irl", *learn_reward(folder / "reach/shown/demonstrations.parquet"))
     return folder
 
 
@@ -263,8 +253,8 @@ def test_every_key_of_an_irl_run_counts_or_is_refused(
     method: str, made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """What methods share is tried with MT-CSIRL; with the others, what an IRL has of its own."""
-    files = [str(made / task / "shown/demonstrations.parquet") for task in ("reach", "drawer-close")]
-    words = ("--method", method, "--cs-reward", "velocity", "--seed", "0", "--demonstrations", *files)
+    files = [made / task / "shown/demonstrations.parquet" for task in ("reach", "drawer-close")]
+    _, *words = learn_reward(*files, method=method)
     only = "" if method == "mt_csirl" else "irl."
     kind = Kind("learn_reward", IRL, tmp_path, *words, method=method)
     check(kind, only)

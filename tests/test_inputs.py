@@ -17,6 +17,7 @@ from mtcsirl.episodes.demonstrations import COLUMNS
 from mtcsirl.files import storage
 from mtcsirl.settings.loading import CONFIG, configured, load, merge, read_yaml
 from mtcsirl.study.outputs import OUTPUTS
+from tests.words import learn_reward
 
 KEY = ["--task", "reach", "--seed", "0"]
 VELOCITY = ["--cs-reward", "velocity"]
@@ -176,18 +177,7 @@ def test_an_experiment_that_the_demonstrations_are_not_is_refused(
         files.append(f"{task}{target}.parquet")
         rows = {name: [0.0] for name in COLUMNS} | {"task": [task], "target": [target]}
         storage.write_parquet(here / files[-1], pd.DataFrame(rows))
-    words = [
-        "learn-reward",
-        "--method",
-        "mt_csirl",
-        "--cs-reward",
-        "velocity",
-        "--seed",
-        "0",
-        "--demonstrations",
-        *files,
-    ]
-    assert f"which is {found}" in fails(capsys, *words, "--output", "run", "--experiment", asked)
+    assert f"which is {found}" in fails(capsys, *learn_reward(*files), "--output", "run", "--experiment", asked)
     assert not (here / "run").exists()
 
 

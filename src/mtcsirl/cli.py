@@ -81,6 +81,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except stop.Stopped as stopped:
         return _say(stopped.line, 128 + stopped.signal)
     except Exception as error:
+        signalled = stopped_by(error)
+        if signalled is not None:
+            return _say(signalled.line, 128 + signalled.signal)
         line = explained(error)
         if line is not None:
             return _say(line, 2)
@@ -102,6 +105,13 @@ def _run(parsed: argparse.Namespace) -> None:
     lost = console.lost()
     if lost is not None and parsed.only_prints:
         raise UserError(f"standard output: {lost}; what was printed is not all there")
+
+
+def stopped_by(error: BaseException | None) -> stop.Stopped | None:
+    """The signal that caused an error: a library that is loaded meanwhile makes an ImportError of it."""
+    while error is not None and not isinstance(error, stop.Stopped):
+        error = error.__cause__
+    return error
 
 
 def explained(error: Exception) -> str | None:

@@ -18,17 +18,17 @@ def dry_run(snakemake: Snakemake, scale: str, *targets: str) -> dict[str, int]:
 
 @pytest.mark.parametrize("target", ARTEFACTS)
 @pytest.mark.parametrize("scale", ["desk", "paper"])
-def test_an_artefact_plans_the_jobs_that_the_design_says(snakemake: Snakemake, scale: str, target: str) -> None:
-    assert dry_run(snakemake, scale, target) == design(load(scale=scale), target).jobs() | {target: 1}
+def test_an_artefact_plans_the_jobs_that_the_design_says(planner: Snakemake, scale: str, target: str) -> None:
+    assert dry_run(planner, scale, target) == design(load(scale=scale), target).jobs() | {target: 1}
 
 
 @pytest.mark.parametrize("target", ABLATIONS)
-def test_an_ablation_plans_its_runs_by_the_rules_of_the_main_study(snakemake: Snakemake, target: str) -> None:
-    assert dry_run(snakemake, "desk", target) == design(load(scale="desk"), target).jobs() | {target: 1}
+def test_an_ablation_plans_its_runs_by_the_rules_of_the_main_study(planner: Snakemake, target: str) -> None:
+    assert dry_run(planner, "desk", target) == design(load(scale="desk"), target).jobs() | {target: 1}
 
 
-def test_diagnostics_needs_irl_runs_and_what_they_need_alone(snakemake: Snakemake) -> None:
-    planned, jobs = dry_run(snakemake, "desk", "diagnostics"), design(load(scale="desk")).jobs()
+def test_diagnostics_needs_irl_runs_and_what_they_need_alone(planner: Snakemake) -> None:
+    planned, jobs = dry_run(planner, "desk", "diagnostics"), design(load(scale="desk")).jobs()
     runs = jobs["learn_reward"]
     assert planned["learn_reward"] == planned["draw_diagnostics"] == runs
     assert planned.keys() == {
@@ -44,15 +44,15 @@ def test_all_is_the_whole_study_with_every_artefact(snakemake: Snakemake, scale:
 
 
 @pytest.mark.parametrize("target", ["claims", "report", "all"])
-def test_collecting_targets_need_the_whole_study(snakemake: Snakemake, target: str) -> None:
-    planned = dry_run(snakemake, "smoke", target)
+def test_collecting_targets_need_the_whole_study(planner: Snakemake, target: str) -> None:
+    planned = dry_run(planner, "smoke", target)
     assert planned.items() >= design(load(scale="smoke")).jobs().items()
     assert planned[target] == 1
 
 
 @pytest.mark.parametrize("folder", ["expert/velocity/reach-t1/s0", "results/expert/velocity/reach-t1/s0"])
 def test_one_run_can_be_asked_for(
-    snakemake: Snakemake,
+    planner: Snakemake,
     workspace: Path,
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
@@ -60,14 +60,14 @@ def test_one_run_can_be_asked_for(
 ) -> None:
     monkeypatch.chdir(workspace)
     assert cli.main(["target", folder]) == 0
-    planned = dry_run(snakemake, "desk", capsys.readouterr().out.strip())
+    planned = dry_run(planner, "desk", capsys.readouterr().out.strip())
     assert planned == {"train_expert": 1}
     assert cli.main(["target", "expert/velocity/reach-t1/s7"]) == 2
     assert "is no run of the study at scale desk" in capsys.readouterr().err
 
 
-def test_a_run_outside_the_study_is_refused(snakemake: Snakemake) -> None:
-    done = snakemake("-n", "results/expert/velocity/reach-t1/s7/.0123456789abcdef.made")
+def test_a_run_outside_the_study_is_refused(planner: Snakemake) -> None:
+    done = planner("-n", "results/expert/velocity/reach-t1/s7/.0123456789abcdef.made")
     assert done.returncode != 0
     assert "expert/velocity/reach-t1/s7 is no run of the study at scale desk" in done.stdout + done.stderr
 
@@ -85,11 +85,9 @@ BAD = {
 
 
 @pytest.mark.parametrize("mistake", BAD)
-def test_a_bad_configuration_is_one_line_and_leaves_no_trace(
-    snakemake: Snakemake, tmp_path: Path, mistake: str
-) -> None:
+def test_a_bad_configuration_is_one_line_and_leaves_no_trace(planner: Snakemake, tmp_path: Path, mistake: str) -> None:
     value, says = BAD[mistake]
-    done = snakemake("--cores", "1", "--config", value, cwd=tmp_path)
+    done = planner("--cores", "1", "--config", value, cwd=tmp_path)
     assert done.returncode != 0
     (line,) = [line for line in done.stderr.splitlines() if line.startswith("configuration:")]
     assert says in line

@@ -73,13 +73,13 @@ NEUTRAL = {
 
 
 @pytest.mark.parametrize("what", NEUTRAL)
-def test_what_changes_no_number_reruns_nothing(smoke: Path, snakemake: Snakemake, change: Change, what: str) -> None:
+def test_what_changes_no_number_reruns_nothing(smoke: Path, loaded: Snakemake, change: Change, what: str) -> None:
     change(*NEUTRAL[what])
-    assert plan(snakemake) == {}
+    assert plan(loaded) == {}
 
 
 def test_a_function_moved_and_a_file_renamed_rerun_nothing(
-    smoke: Path, snakemake: Snakemake, change: Change, workspace: Path
+    smoke: Path, loaded: Snakemake, change: Change, workspace: Path
 ) -> None:
     source = workspace / "src/mtcsirl/rewards/curriculum.py"
     renamed = source.with_name("lesson.py")
@@ -88,16 +88,16 @@ def test_a_function_moved_and_a_file_renamed_rerun_nothing(
         change(str(path.relative_to(workspace / "src/mtcsirl")), r"rewards\.curriculum", "rewards.lesson")
     source.rename(renamed)
     try:
-        assert plan(snakemake) == {}
+        assert plan(loaded) == {}
     finally:
         renamed.rename(source)
 
 
-def test_a_new_key_with_the_value_of_old_reruns_nothing(smoke: Path, snakemake: Snakemake, change: Change) -> None:
+def test_a_new_key_with_the_value_of_old_reruns_nothing(smoke: Path, loaded: Snakemake, change: Change) -> None:
     key = '    novelty: float = key(0.0, "something new", absent=0.0)\n    device: Annotated[str'
     change("settings/learner.py", r"    device: Annotated\[str", key)
-    assert plan(snakemake) == {}
-    again = plan(snakemake, "--config", "sac={novelty: 1.0}")
+    assert plan(loaded) == {}
+    again = plan(loaded, "--config", "sac={novelty: 1.0}")
     assert stages(again) >= {"train_expert", "train_sac", "learn_reward", "transfer"}
 
 
@@ -116,19 +116,19 @@ CONCERNED = {
 
 
 @pytest.mark.parametrize("what", CONCERNED)
-def test_an_edit_reruns_what_it_concerns(smoke: Path, snakemake: Snakemake, change: Change, what: str) -> None:
+def test_an_edit_reruns_what_it_concerns(smoke: Path, loaded: Snakemake, change: Change, what: str) -> None:
     edit, concerned = CONCERNED[what]
     change(*edit)
-    planned = plan(snakemake)
+    planned = plan(loaded)
     assert stages(planned) == concerned
     assert not DRAWN_FROM_NO_RUN & set(planned)
 
 
 def test_one_methods_logit_reruns_that_method(
-    smoke: Path, snakemake: Snakemake, change: Change, smoke_settings: Settings
+    smoke: Path, loaded: Snakemake, change: Change, smoke_settings: Settings
 ) -> None:
     change("irl/methods/mt_csirl_lt.py", r"temperature / 2", "temperature / 3")
-    planned, whole = plan(snakemake), design(smoke_settings)
+    planned, whole = plan(loaded), design(smoke_settings)
     assert planned["learn_reward"] == sum(run.method == "mt_csirl_lt" for run in whole.irl_runs)
     assert planned["transfer"] == sum(run.irl.method == "mt_csirl_lt" for run in whole.transfers)
     assert not {"train_expert", "train_sac", "collect_demonstrations"} & set(planned)
@@ -141,23 +141,23 @@ def _method(run: object) -> str:
     return irl.method if isinstance(irl, IrlRun) else ""
 
 
-def test_a_figure_is_drawn_again_alone(smoke: Path, snakemake: Snakemake, change: Change) -> None:
+def test_a_figure_is_drawn_again_alone(smoke: Path, loaded: Snakemake, change: Change) -> None:
     change("figures/figure_3.py", r"TITLE = ", 'TITLE = "" + ')
-    assert plan(snakemake) == {"figure_3": 1}
+    assert plan(loaded) == {"figure_3": 1}
 
 
-def test_a_style_sheet_redraws_figures_alone(smoke: Path, snakemake: Snakemake, change: Change) -> None:
+def test_a_style_sheet_redraws_figures_alone(smoke: Path, loaded: Snakemake, change: Change) -> None:
     change("figures/mtcsirl.mplstyle", r"\Z", "\nlines.linewidth: 1.7\n")
-    planned = plan(snakemake)
+    planned = plan(loaded)
     assert not stages(planned)
     drawn = {name for name in ARTEFACTS if name.startswith("figure")}
     assert drawn <= set(planned)
     assert not {"table_2", "table_4", "table_5"} & set(planned)
 
 
-def test_a_table_is_made_again_alone(smoke: Path, snakemake: Snakemake, change: Change) -> None:
+def test_a_table_is_made_again_alone(smoke: Path, loaded: Snakemake, change: Change) -> None:
     change("tables/table_4.py", r"REMARK = ", 'REMARK = "" + ')
-    assert plan(snakemake) == {"table_4": 1}
+    assert plan(loaded) == {"table_4": 1}
 
 
 KEYS = {
@@ -171,14 +171,14 @@ KEYS = {
 
 
 @pytest.mark.parametrize("key", KEYS)
-def test_a_changed_key_reruns_what_depends_on_it(smoke: Path, snakemake: Snakemake, key: str) -> None:
-    planned = plan(snakemake, "--config", key)
+def test_a_changed_key_reruns_what_depends_on_it(smoke: Path, loaded: Snakemake, key: str) -> None:
+    planned = plan(loaded, "--config", key)
     assert stages(planned) == KEYS[key]
     assert not DRAWN_FROM_NO_RUN & set(planned), "drawn from no run"
 
 
-def test_an_added_seed_keeps_the_old_runs(smoke: Path, snakemake: Snakemake, smoke_settings: Settings) -> None:
-    planned = plan(snakemake, "--config", "seeds=[0,1]", "irl_seeds=[0,1]")
+def test_an_added_seed_keeps_the_old_runs(smoke: Path, loaded: Snakemake, smoke_settings: Settings) -> None:
+    planned = plan(loaded, "--config", "seeds=[0,1]", "irl_seeds=[0,1]")
     larger = design(smoke_settings.model_copy(update={"seeds": (0, 1), "irl_seeds": (0, 1)})).jobs()
     done = design(smoke_settings).jobs()
     for stage, count in larger.items():
@@ -186,16 +186,16 @@ def test_an_added_seed_keeps_the_old_runs(smoke: Path, snakemake: Snakemake, smo
         assert planned.get(stage, 0) == count - kept, stage
 
 
-def test_a_lost_file_is_made_again(smoke: Path, snakemake: Snakemake) -> None:
+def test_a_lost_file_is_made_again(smoke: Path, loaded: Snakemake) -> None:
     for lost, jobs in (("tables/table_5.tex", {"table_5": 1}), ("sac/reach-wall-t0/s0/curve.csv", {"train_sac": 1})):
         path = smoke / "results/smoke" / lost
         content = path.read_bytes()
         path.unlink()
         try:
-            assert {name: n for name, n in plan(snakemake).items() if name in jobs} == jobs
+            assert {name: n for name, n in plan(loaded).items() if name in jobs} == jobs
         finally:
             path.write_bytes(content)
-    assert plan(snakemake) == {}
+    assert plan(loaded) == {}
 
 
 def test_neither_times_nor_records_nor_place_decide(smoke: Path, snakemake: Snakemake, tmp_path: Path) -> None:
@@ -222,11 +222,15 @@ def test_status_says_why(smoke: Path, monkeypatch: pytest.MonkeyPatch, capsys: p
 
 
 def test_touching_does_not_hide_what_is_stale(
-    smoke: Path, snakemake: Snakemake, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    smoke: Path,
+    snakemake: Snakemake,
+    loaded: Snakemake,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     key = ("--config", "sac={discount: 0.9}")
     snakemake("--touch", "--cores", "1", *SMOKE, *key)
-    assert stages(plan(snakemake, *key)) == RUNS
+    assert stages(plan(loaded, *key)) == RUNS
     logs = [log for log in smoke.glob("results/smoke/logs/**/*.log") if not log.stat().st_size]
     assert logs, "touching leaves an empty log per run"
     for log in logs:

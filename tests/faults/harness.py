@@ -8,8 +8,10 @@ import traceback
 from collections.abc import Callable
 from pathlib import Path
 
+from mtcsirl.cli import stopped_by
 from mtcsirl.files import stop
 
+SIGNALS = (signal.SIGTERM, signal.SIGINT)
 LONG = os.environ.get("MTCSIRL_FAULTS") == "long"
 """Everything in place of a sample: minutes instead of seconds."""
 
@@ -20,22 +22,31 @@ def fork(work: Callable[[], object]) -> int:
     """Do ``work`` in a child that ends like a job of the command line; its pid."""
     sys.stdout.flush()
     sys.stderr.flush()
+    # a signal that comes before the child heeds it, or after, waits: it would hit what is no job
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)
     child = os.fork()
     if child:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
         return child
     code = 1
     try:
+        sys.settrace(None)  # coverage would slow the child down and be lost with it
         nothing = os.open(os.devnull, os.O_WRONLY)
         os.dup2(nothing, 1)
         os.dup2(nothing, 2)
         signal.signal(signal.SIGINT, signal.default_int_handler)
         with stop.heeded():
-            work()
+            try:
+                signal.pthread_sigmask(signal.SIG_UNBLOCK, SIGNALS)
+                work()
+            finally:
+                signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)
         code = 0
-    except stop.Stopped as stopped:
-        code = 128 + stopped.signal
-    except BaseException:
-        traceback.print_exc()
+    except BaseException as error:
+        stopped = stopped_by(error)
+        code = 1 if stopped is None else 128 + stopped.signal
+        if stopped is None:
+            traceback.print_exc()
     finally:
         os._exit(code)
 

@@ -17,7 +17,7 @@ from mtcsirl.study.keys import identity_of
 from mtcsirl.study.runs import Baseline
 from tests.faults.harness import contents
 
-pytestmark = pytest.mark.dag
+pytestmark = [pytest.mark.dag, pytest.mark.xdist_group("orphans")]
 RUN = Baseline("reach-wall", 0, 0)
 OVERLAY = """
 baseline: {steps: {default: 3000}}

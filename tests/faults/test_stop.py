@@ -4,7 +4,9 @@ import os
 import re
 import signal
 import subprocess
+import sys
 import time
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -14,10 +16,16 @@ from tests.faults.command import RESULTS, train
 from tests.faults.harness import contents
 
 
+@pytest.fixture(autouse=True)
+def _heeding_ctrl_c() -> Iterator[None]:
+    """A shell's background jobs ignore it, these tests among them, and what they start inherits that."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
 def _started(command: list[str], folder: Path) -> subprocess.Popen[str]:
-    # a shell's background jobs ignore Ctrl-C, and what they start inherits that
-    heeding = {"preexec_fn": lambda: signal.signal(signal.SIGINT, signal.default_int_handler)}
-    job = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, **heeding)
+    job = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
     while not list(folder.glob("checkpoint*")):
         assert job.poll() is None
         time.sleep(0.01)
@@ -88,3 +96,33 @@ def test_handlers_are_put_back() -> None:
     with stop.heeded():
         assert signal.getsignal(signal.SIGTERM) is not before
     assert signal.getsignal(signal.SIGTERM) is before
+
+
+IN_A_LIBRARY = """
+import _imp, signal, sys
+from mtcsirl.cli import main
+
+loading = False
+
+def look(frame, event, called):
+    global loading
+    if event.startswith("c_") and called in (_imp.create_dynamic, _imp.exec_dynamic):
+        loading = event == "c_call" and "mujoco._" in str(frame.f_locals["args"])
+    elif event == "call" and loading:
+        sys.setprofile(None)
+        print("inside")
+        signal.raise_signal(signal.SIGTERM)
+
+sys.setprofile(look)
+sys.exit(main(sys.argv[1:]))
+"""
+
+
+def test_a_signal_while_a_library_loads_is_no_bug(tmp_path: Path) -> None:
+    """MuJoCo's own modules make an ImportError of what ends them."""
+    command = [sys.executable, "-c", IN_A_LIBRARY, *train(tmp_path / "run")[3:]]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.stdout == "inside\n"
+    assert done.returncode == 143
+    says = "stopped by SIGTERM; the same command goes on from its last checkpoint, if it has one"
+    assert done.stderr == f"mtcsirl: {says}\n"

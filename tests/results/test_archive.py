@@ -32,6 +32,7 @@ from mtcsirl.study.status import study_status
 from mtcsirl.study.verification import faults
 from tests.conftest import CHECKOUT
 from tests.results.made_up import sign, write_demonstrations, write_run
+from tests.words import learn_reward
 
 SEVERAL = {
     "seeds": (0,),
@@ -253,8 +254,7 @@ def test_only_what_the_note_names_of_these_bytes_may_be_missing(whole, tmp_path,
 def test_who_needs_what_was_not_archived_is_told_in_one_line(whole, tmp_path, capsys):
     archive.unpack(whole, tmp_path)
     shown = tmp_path / SHOWN.folder / "demonstrations.parquet"
-    words = ["learn-reward", "--method", "mt_csirl", "--cs-reward", "velocity", "--seed", "0"]
-    assert cli.main([*words, "--demonstrations", str(shown), "--output", str(tmp_path / "own")]) == 2
+    assert cli.main([*learn_reward(shown), "--output", str(tmp_path / "own")]) == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert f"{shown}: was not archived; delete {shown.parent / NOTE}, and snakemake makes the run again" in line
     expert = tmp_path / SHOWN.expert.folder

@@ -7,38 +7,13 @@ import subprocess
 import sys
 import time
 from contextlib import suppress
-from dataclasses import replace
 from pathlib import Path
 
-import pytest
-
-from mtcsirl.files import storage
-from mtcsirl.files.identity import FILE, Record, checksums, dumps, result_files
 from mtcsirl.settings import Settings
-from mtcsirl.settings.loading import load
 from mtcsirl.study.design import design
-from mtcsirl.study.keys import Run, identity_of
-from mtcsirl.study.outputs import OUTPUTS
 from mtcsirl.study.status import before_it_starts
 from tests.conftest import CHECKOUT
-
-
-@pytest.fixture
-def settings(tmp_path: Path) -> Settings:
-    return load((), (f"results={tmp_path / 'results'}", "seeds=[0]", "irl_seeds=[0]"), "smoke")
-
-
-def finish(run: Run, settings: Settings, **other: object) -> None:
-    """Leave what a run leaves; ``other``: settings that were other ones when it ran."""
-    folder = Path(settings.results) / run.folder
-    for name in OUTPUTS[run.stage]:
-        storage.write_text(folder / name, "{}")
-    storage.write_json(folder / "provenance.json", {"cost": {"wall_seconds": 3.0}})
-    storage.write_json(folder / "gate.json", {"passed": True})
-    identity = identity_of(run, settings)
-    identity = replace(identity, settings=dict(identity.settings) | other)
-    record = Record(identity, checksums(folder, result_files(folder)), {})
-    storage.write_text(folder / FILE, dumps(record))
+from tests.study.made_up import finish
 
 
 def test_a_line_says_what_is_done_stale_and_why(settings: Settings) -> None:

@@ -1,0 +1,70 @@
+"""Markers are a workflow's view of what stands in folders: whoever plans rewrites them, a job leaves them alone."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from mtcsirl.files import storage
+from mtcsirl.files.identity import marker, write_marker
+from mtcsirl.settings import Settings
+from mtcsirl.study.artefacts import record_folder, settle_artefacts, sign_artefact
+from mtcsirl.study.design import design
+from mtcsirl.study.standing import settle
+from tests.study.made_up import finish
+
+Settle = Callable[[bool], dict[str, str]]
+DONE, LOST = "figure_1", "table_5"
+"""Two pages that show no run."""
+
+
+def markers(folder: Path) -> set[str]:
+    """The markers in a folder."""
+    return {path.name for path in folder.glob(marker("*"))}
+
+
+@pytest.fixture
+def runs(settings: Settings) -> tuple[Path, Path, Settle]:
+    """The folder of a run that is done and has no marker, of a stale one that has it, and what settles both."""
+    done, stale = design(settings).baselines[:2]
+    finish(done, settings)
+    finish(stale, settings, steps=123)
+    folders = [Path(settings.results) / run.folder for run in (done, stale)]
+    return *folders, lambda mark: settle([done, stale], settings, mark=mark)
+
+
+@pytest.fixture
+def pages(settings: Settings) -> tuple[Path, Path, Settle]:
+    """The same of two pages; the stale one lost its file."""
+    for name in (DONE, LOST):
+        file = Path(settings.results) / name
+        storage.write_text(file, "drawn")
+        sign_artefact(name, settings, [file])
+    file.unlink()
+    done, lost = (record_folder(name, settings.results) for name in (DONE, LOST))
+    write_marker(done, None)
+    return done, lost, lambda mark: settle_artefacts([DONE, LOST], settings, mark=mark)
+
+
+@pytest.fixture(params=["runs", "pages"])
+def found(request: pytest.FixtureRequest) -> tuple[Path, Path, Settle, list[str]]:
+    """Both with false markers, and the hashes that they must have."""
+    done, stale, settled = request.getfixturevalue(request.param)
+    wanted = list(settled(False).values())
+    write_marker(stale, wanted[1])
+    return done, stale, settled, wanted
+
+
+def test_whoever_plans_marks_what_is_done_and_nothing_else(found: tuple[Path, Path, Settle, list[str]]) -> None:
+    done, stale, settled, wanted = found
+    assert list(settled(True).values()) == wanted
+    assert markers(done) == {marker(wanted[0])}
+    assert markers(stale) == set()
+
+
+def test_a_job_that_reads_the_workflow_touches_no_marker(found: tuple[Path, Path, Settle, list[str]]) -> None:
+    """A marker that is there, of a run that another job makes at this moment, may be newer than what was planned."""
+    done, stale, settled, wanted = found
+    assert list(settled(False).values()) == wanted
+    assert markers(done) == set()
+    assert markers(stale) == {marker(wanted[1])}
