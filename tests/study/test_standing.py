@@ -6,8 +6,10 @@ from pathlib import Path
 import pytest
 
 from mtcsirl.files import storage
-from mtcsirl.files.identity import marker, write_marker
+from mtcsirl.files.identity import CHECKPOINT, marker, write_marker
+from mtcsirl.irl import run
 from mtcsirl.settings import Settings
+from mtcsirl.stages import running
 from mtcsirl.study.artefacts import record_folder, settle_artefacts, sign_artefact
 from mtcsirl.study.design import design
 from mtcsirl.study.standing import settle
@@ -68,3 +70,18 @@ def test_a_job_that_reads_the_workflow_touches_no_marker(found: tuple[Path, Path
     assert list(settled(False).values()) == wanted
     assert markers(done) == set()
     assert markers(stale) == {marker(wanted[1])}
+
+
+def test_a_run_that_is_done_loses_its_checkpoint_and_any_other_keeps_it(runs: tuple[Path, Path, Settle]) -> None:
+    done, stale, settled = runs
+    for folder in (done, stale):
+        storage.write_text(folder / CHECKPOINT, "of a run that was killed after its record was written")
+    settled(False)
+    assert (done / CHECKPOINT).is_file()
+    settled(True)
+    assert not (done / CHECKPOINT).exists()
+    assert (stale / CHECKPOINT).is_file()
+
+
+def test_a_checkpoint_has_one_name() -> None:
+    assert {CHECKPOINT} == {running.CHECKPOINT, run.CHECKPOINT}

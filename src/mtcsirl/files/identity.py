@@ -20,6 +20,8 @@ from mtcsirl.files.fingerprint import Code, digest
 
 FORMAT = "mtcsirl identity 1"
 FILE = "identity.json"
+CHECKPOINT = "checkpoint.safetensors"
+"""What a run leaves until it is done, and a run that was killed in its last moment for longer."""
 NOTE = "archived.json"
 """Left by an archive in a folder that it restored: which result files it had not kept."""
 NOT_RESULTS = (FILE, NOTE, "provenance.json", "checkpoint.safetensors")

@@ -6,7 +6,8 @@ from pathlib import Path
 from typing import Any
 
 from mtcsirl.errors import UserError
-from mtcsirl.files.identity import Identity, Record, differences, lost, read_record, write_marker
+from mtcsirl.files import storage
+from mtcsirl.files.identity import CHECKPOINT, Identity, Record, differences, lost, read_record, write_marker
 from mtcsirl.settings import Settings
 from mtcsirl.study.keys import Run, identity_of
 
@@ -61,8 +62,9 @@ def _over_its_inputs(run: Run[Any], record: Record, results: Path) -> Standing:
 def settle(runs: Iterable[Run[Any]], settings: Settings, *, mark: bool = True) -> dict[str, str]:
     """Leave in every folder the marker of what stands there; returns the hash that each run must have, by folder.
 
-    Markers are a workflow's view: rewritten from the records each time it is read, whatever happened in between.
-    Without ``mark`` none is touched: a job that reads the workflow would take away what another has just left.
+    Markers are a workflow's view: rewritten from the records each time it is read, whatever happened in between; and a
+    run that is done needs no checkpoint, which one killed in its last moment still has.
+    Without ``mark`` nothing is touched: a job that reads the workflow would take away what another has just left.
     """
     wanted: dict[str, str] = {}
     for run in runs:
@@ -71,4 +73,6 @@ def settle(runs: Iterable[Run[Any]], settings: Settings, *, mark: bool = True) -
         if mark and folder.is_dir():
             done = standing(run, settings).state == DONE
             write_marker(folder, wanted[run.folder] if done else None)
+            if done:
+                storage.remove(folder / CHECKPOINT)
     return wanted
