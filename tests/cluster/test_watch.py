@@ -35,6 +35,7 @@ def inside(cluster: Cluster, monkeypatch: pytest.MonkeyPatch) -> Cluster:
 @pytest.fixture
 def outside(cluster: Cluster, monkeypatch: pytest.MonkeyPatch) -> None:
     """The commands are there and no cluster."""
+    monkeypatch.setattr(slurm, "PATIENCE", 3)
     monkeypatch.setenv("SLURM_CONF", "/nowhere/slurm.conf")
 
 
@@ -74,6 +75,7 @@ def test_silence_and_its_end_are_said_once(inside: Cluster, monkeypatch: pytest.
     watch = slurm.Watch("squeue", waiting, said.append)
     watch.look()
     with monkeypatch.context() as away:
+        away.setattr(slurm, "PATIENCE", 3)
         away.setenv("SLURM_CONF", "/nowhere/slurm.conf")
         watch.look()
         watch.look()
