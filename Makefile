@@ -3,7 +3,7 @@ PYTHON ?= python3
 CORES ?= 2
 VENV := .venv
 BIN := $(VENV)/bin
-EXTRAS := dev,export,tensorboard,video
+EXTRAS := dev,export,slurm,tensorboard,video
 SMOKE := --configfile config/smoke.yaml
 # the tools find each other, and every job finds `mtcsirl`, without an activated environment
 export PATH := $(CURDIR)/$(BIN):$(PATH)

@@ -16,6 +16,7 @@ configfile: f"{workflow.basedir}/config/config.yaml"
 
 
 include: "workflow/rules/common.smk"
+include: "workflow/rules/slurm.smk"
 include: "workflow/rules/experts.smk"
 include: "workflow/rules/demonstrations.smk"
 include: "workflow/rules/irl.smk"

@@ -13,8 +13,8 @@ import pytest
 from tests.conftest import CHECKOUT
 
 PACKAGE = CHECKOUT / "src" / "mtcsirl"
-_ROOMS = """names errors transitions extensions files worlds rewards settings episodes agents irl study results stages
-claims tables figures report validation exports commands cli"""
+_ROOMS = """names errors transitions extensions slurm files worlds rewards settings episodes agents irl study results
+stages claims tables figures report validation exports commands cli"""
 ROOMS = tuple(_ROOMS.split())
 """Packages and modules below ``mtcsirl``; each may import the ones before it."""
 LONGEST = 300

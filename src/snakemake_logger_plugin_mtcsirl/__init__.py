@@ -79,13 +79,18 @@ class LogHandler(LogHandlerBase):
             line = self._screen.finished(said["job_id"])
             return [] if self._live or not line else [short(f"{time.strftime('%H:%M:%S')} {line}")]
         elif event == LogEvent.JOB_ERROR:
-            return self._screen.fails(said["jobid"], said["rule_name"], made(said), paths(said["log"]))
+            return self._failed(said)
         elif event not in NO_LINES:
             text = self.format(record)
             if record.levelno >= logging.WARNING or event is not None:
                 return [] if UNSAID.match(text) or COMMAND.search(text) else wrapped(text)
             return [short(line) for line in text.splitlines() if line.strip() and not UNSAID.match(line)]
         return []
+
+    def _failed(self, said: dict[str, Any]) -> list[str]:
+        """What failed, why in the words of the cluster, and the last lines of its log."""
+        first, *log = self._screen.fails(said["jobid"], said["rule_name"], made(said), paths(said["log"]))
+        return [first, *(short(f"    {line}") for line in reason(said)), *log]
 
     def _write(self, lines: list[str]) -> None:
         if not lines and not self._live:
@@ -109,6 +114,12 @@ def made(said: dict[str, Any]) -> str:
         return ""
     first = Path(output[0].split(" (")[0])
     return str(first.parent if first.name.startswith(".") else first.with_suffix(""))
+
+
+def reason(said: dict[str, Any]) -> list[str]:
+    """The first sentence that an executor has for a failure, if it has one."""
+    message = str(said.get("rule_msg") or "").partition("For further error details")[0]
+    return [f"{message.split('. ')[0].rstrip('. ')}"] if message else []
 
 
 def paths(logs: Any) -> list[Path]:

@@ -72,6 +72,7 @@ pathvars:
 
 onstart:
     if workflow.is_main_process:
+        watch_slurm()
         logger.info(before_it_starts(STUDY, SETTINGS))
         EXPECTED.update((s.stage, 3600 * s.core_hours / s.jobs) for s in plan(STUDY, SETTINGS, RATES))
 
