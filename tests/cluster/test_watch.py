@@ -9,7 +9,7 @@ from mtcsirl import slurm
 from mtcsirl.errors import UserError
 from tests.cluster.slurm import Cluster, NotStartedError, lacking, main, started
 
-pytestmark = pytest.mark.dag
+pytestmark = [pytest.mark.dag, pytest.mark.xdist_group("slurm")]
 
 
 class Waiting:
