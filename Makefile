@@ -3,12 +3,12 @@ PYTHON ?= python3
 CORES ?= 2
 VENV := .venv
 BIN := $(VENV)/bin
-EXTRAS := dev,export,tensorboard,video
+EXTRAS := dev,docs,export,tensorboard,video
 SMOKE := --configfile config/smoke.yaml
 # the tools find each other, and every job finds `mtcsirl`, without an activated environment
 export PATH := $(CURDIR)/$(BIN):$(PATH)
 
-.PHONY: help setup replicate smoke quick test lint bench bench-node audit constraints
+.PHONY: help setup replicate smoke quick test lint bench bench-node docs audit constraints
 
 help:  ## print this list
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
@@ -59,6 +59,10 @@ lint: setup  ## formatting, lint and types, all of which must be clean
 	ruff format --check
 	mypy src
 	snakefmt --check Snakefile workflow
+
+# mkdocs-material says at length that the next major version of MkDocs is another program; the version here is pinned
+docs: setup  ## the pages of docs/ as a searchable site, build/site/index.html; a broken link ends it
+	NO_MKDOCS_2_WARNING=1 python -m mkdocs build
 
 bench: setup  ## measured ratios against stable-baselines3, stock Meta-World and imitation
 	sh benchmarks/imitation_environment.sh
