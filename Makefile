@@ -1,14 +1,15 @@
 # Everything into .venv, from nothing but Python, Git and Make.
 PYTHON ?= python3
 CORES ?= 2
+DOCKER ?= podman
 VENV := .venv
 BIN := $(VENV)/bin
-EXTRAS := dev,export,slurm,tensorboard,video
+EXTRAS := dev,docs,export,slurm,tensorboard,video
 SMOKE := --configfile config/smoke.yaml
 # the tools find each other, and every job finds `mtcsirl`, without an activated environment
 export PATH := $(CURDIR)/$(BIN):$(PATH)
 
-.PHONY: help setup replicate smoke quick test lint bench bench-node audit constraints
+.PHONY: help setup replicate smoke quick test lint bench bench-node docs image audit constraints
 
 help:  ## print this list
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
@@ -60,6 +61,10 @@ lint: setup  ## formatting, lint and types, all of which must be clean
 	mypy src
 	snakefmt --check Snakefile workflow
 
+# mkdocs-material says at length that the next major version of MkDocs is another program; the version here is pinned
+docs: setup  ## the pages of docs/ as a searchable site, build/site/index.html; a broken link ends it
+	NO_MKDOCS_2_WARNING=1 python -m mkdocs build
+
 bench: setup  ## measured ratios against stable-baselines3, stock Meta-World and imitation
 	sh benchmarks/imitation_environment.sh
 	python -m benchmarks
@@ -67,17 +72,21 @@ bench: setup  ## measured ratios against stable-baselines3, stock Meta-World and
 bench-node: setup  ## what this machine trains a second, on its GPU if it has one: eight minutes
 	python -m benchmarks.node --workers $(CORES)
 
+image:  ## a container with the suite and its environment, by podman or DOCKER=docker
+	$(DOCKER) build --tag mtcsirl --file containers/Containerfile .
+
 audit:  ## look constraints.txt up in a database of known vulnerabilities; needs the network
 	$(PYTHON) -m venv build/audit
 	build/audit/bin/python -m pip install --quiet pip-audit
 	$(PYTHON) .ci/audit.py build/audit/bin/pip-audit constraints.txt
 
-constraints:  ## renew constraints.txt: the newest versions that pyproject.toml allows
+# `make constraints KEEP="--constraint constraints.txt"` adds what pyproject.toml newly asks for and changes nothing else
+constraints:  ## renew requirements.lock and constraints.txt: the newest versions that pyproject.toml allows
 	rm -rf build/constraints
 	$(PYTHON) -m venv build/constraints
-	build/constraints/bin/python -m pip install --quiet --editable ".[$(EXTRAS)]"
-	{ echo "# Exact versions of every dependency, from \`make constraints\`; torch without hash or build: these differ by platform."; \
-	  build/constraints/bin/python -m pip list --format=freeze --exclude-editable --exclude pip --exclude setuptools \
-	  | grep -viE '^(nvidia|cuda|triton)' | sed 's/+.*//' | LC_ALL=C sort -f; } > build/constraints.txt
-	mv build/constraints.txt constraints.txt
+	build/constraints/bin/python -m pip install --quiet uv
+	build/constraints/bin/uv pip compile pyproject.toml --quiet --all-extras --universal --fork-strategy fewest \
+	    --generate-hashes --no-header --no-annotate $(KEEP) --output-file build/constraints/requirements.lock
+	$(PYTHON) .ci/locks.py build/constraints/requirements.lock > build/constraints/constraints.txt
+	mv build/constraints/requirements.lock build/constraints/constraints.txt .
 	rm -rf build/constraints

@@ -15,7 +15,7 @@ from mtcsirl.study.plan import load_rates, plan
 from tests.conftest import CHECKOUT
 
 SOURCE = CHECKOUT / "src" / "mtcsirl"
-DOCUMENTS = [*sorted(CHECKOUT.glob("*.md")), *sorted((CHECKOUT / "docs").glob("*.md"))]
+DOCUMENTS = [*sorted(CHECKOUT.glob("*.md")), *sorted((CHECKOUT / "docs").rglob("*.md"))]
 WRITTEN_BY_HAND = [document for document in DOCUMENTS if document.name != "results.md"]
 
 

@@ -1,9 +1,11 @@
-"""A wheel built from the checkout works without it: verbs, data files, configurations of all scales."""
+"""A wheel built from the checkout works without it: verbs, data files, configurations of all scales, videos."""
 
 import os
 import shutil
 import subprocess
 import sys
+import sysconfig
+import venv
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
@@ -11,6 +13,7 @@ from pathlib import Path
 import pytest
 
 from mtcsirl.settings.loading import CONFIG, SHIPPED
+from tests.conftest import needs_rendering
 
 BUILT_FROM = ("src", "config", "pyproject.toml", "README.md", "LICENSE")
 Run = Callable[..., subprocess.CompletedProcess[str]]
@@ -35,19 +38,30 @@ def wheel(checkout: Path, tmp_path_factory: pytest.TempPathFactory) -> zipfile.Z
 
 
 @pytest.fixture(scope="module")
-def run(wheel: zipfile.ZipFile, tmp_path_factory: pytest.TempPathFactory) -> Run:
-    """Run Python in an empty folder, with the unpacked wheel before everything else."""
-    installed, elsewhere = tmp_path_factory.mktemp("installed"), tmp_path_factory.mktemp("elsewhere")
-    wheel.extractall(installed)
+def environment(wheel: zipfile.ZipFile, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The programs of a fresh environment with the wheel; its dependencies are those of the tests, by their path."""
+    folder = tmp_path_factory.mktemp("fresh")
+    venv.create(folder, with_pip=True)
+    command = [folder / "bin" / "python", "-m", "pip", "install", "--quiet", "--no-index", "--no-deps", wheel.filename]
+    subprocess.run(command, check=True, capture_output=True)
+    (site,) = folder.glob("lib/python*/site-packages")
+    (site / "dependencies.pth").write_text(sysconfig.get_path("purelib"), encoding="utf-8")
+    return folder / "bin"
 
-    def python(*arguments: str) -> subprocess.CompletedProcess[str]:
-        environment = os.environ | {"PYTHONPATH": str(installed), "PYTHONDONTWRITEBYTECODE": "1"}
-        command = [sys.executable, *arguments]
-        return subprocess.run(command, cwd=elsewhere, env=environment, capture_output=True, text=True, check=False)
 
-    where = python("-c", "import mtcsirl; print(mtcsirl.__file__)")
-    assert where.stdout.strip() == str(installed / "mtcsirl/__init__.py"), where.stderr
-    return python
+@pytest.fixture(scope="module")
+def run(environment: Path, tmp_path_factory: pytest.TempPathFactory) -> Run:
+    """Run a program of the fresh environment in a folder of its own, empty at first."""
+    elsewhere = tmp_path_factory.mktemp("elsewhere")
+    inherited = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
+
+    def program(name: str, *arguments: str) -> subprocess.CompletedProcess[str]:
+        command = [str(environment / name), *arguments]
+        return subprocess.run(command, cwd=elsewhere, env=inherited, capture_output=True, text=True, check=False)
+
+    where = program("python", "-c", "import mtcsirl; print(mtcsirl.__file__)")
+    assert Path(where.stdout.strip()).is_relative_to(environment.parent), where.stderr
+    return program
 
 
 def test_every_file_of_the_package_is_in_it(wheel: zipfile.ZipFile, checkout: Path) -> None:
@@ -66,15 +80,15 @@ def test_the_package_brings_the_checkouts_configurations() -> None:
 
 @pytest.mark.parametrize("scale", ["smoke", "desk", "paper"])
 def test_plan(run: Run, scale: str) -> None:
-    done = run("-m", "mtcsirl.cli", "plan", "--scale", scale)
+    done = run("mtcsirl", "plan", "--scale", scale)
     assert done.returncode == 0, done.stderr
     assert "learn_reward" in done.stdout
 
 
 def test_tables_and_claims_of_nothing(run: Run) -> None:
-    table = run("-m", "mtcsirl.cli", "table", "5", "--partial", "--output", "out")
+    table = run("mtcsirl", "table", "5", "--partial", "--output", "out")
     assert table.returncode == 0, table.stderr
-    claims = run("-m", "mtcsirl.cli", "claims", "--partial", "--output", "out")
+    claims = run("mtcsirl", "claims", "--partial", "--output", "out")
     assert claims.returncode == 0, claims.stderr
 
 
@@ -82,14 +96,33 @@ def test_an_agent_trains_and_the_environments_are_there(run: Run) -> None:
     small = ("steps=40", "sac.hidden_sizes=[8]", "evaluation.episodes=1", "evaluation.episode_steps=20")
     settings = [part for one in small for part in ("--set", one)]
     key = ("--task", "reach", "--seed", "0", "--output", "agent")
-    done = run("-m", "mtcsirl.cli", "train-sac", *key, *settings)
+    done = run("mtcsirl", "train-sac", *key, *settings)
     assert done.returncode == 0, done.stderr
     name = "mtcsirl.exports.environments:mtcsirl/reach-wall-v0"
-    made = run("-c", f"import gymnasium; print(gymnasium.make({name!r}, target=3).reset()[0].shape)")
+    made = run("python", "-c", f"import gymnasium; print(gymnasium.make({name!r}, target=3).reset()[0].shape)")
     assert made.stdout == "(39,)\n", made.stderr
 
 
+@needs_rendering
+def test_a_video_of_that_agent(run: Run) -> None:
+    done = run("mtcsirl", "video", "agent", "--output", "agent.gif", "--steps", "8", "--size", "64")
+    assert done.returncode == 0, done.stderr
+    shown = run("python", "-c", "import PIL.Image; print(PIL.Image.open('agent.gif').n_frames)")
+    assert int(shown.stdout) > 1, shown.stderr
+
+
+def test_a_wheel_that_lacks_its_data_is_seen(environment: Path, run: Run) -> None:
+    """What the tests above rest on: none of them falls back on the checkout."""
+    (rates,) = environment.parent.glob("lib/python*/site-packages/mtcsirl/study/calibration.json")
+    away = rates.with_suffix(".away")
+    rates.rename(away)
+    try:
+        assert run("mtcsirl", "plan").returncode != 0
+    finally:
+        away.rename(rates)
+
+
 def test_what_is_not_there_is_one_line(run: Run) -> None:
-    done = run("-m", "mtcsirl.cli", "plan", "--config", "config/paper.yaml")
+    done = run("mtcsirl", "plan", "--config", "config/paper.yaml")
     assert done.returncode == 2
     assert len(done.stderr.splitlines()) == 1

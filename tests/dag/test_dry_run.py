@@ -62,7 +62,9 @@ def test_one_run_can_be_asked_for(
     assert cli.main(["target", folder]) == 0
     planned = dry_run(planner, "desk", capsys.readouterr().out.strip())
     assert planned == {"train_expert": 1}
-    assert cli.main(["target", "expert/velocity/reach-t1/s7"]) == 2
+    assert cli.main(["target", folder, "sac/reach-wall-t0/s0"]) == 0
+    assert len(capsys.readouterr().out.split()) == 2
+    assert cli.main(["target", folder, "expert/velocity/reach-t1/s7"]) == 2
     assert "is no run of the study at scale desk" in capsys.readouterr().err
 
 

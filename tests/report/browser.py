@@ -31,7 +31,7 @@ const report = found => {
 INSPECT = (
     REPORT
     + """
-addEventListener("load", () => {
+addEventListener("load", async () => {
   const page = document.querySelector("iframe").contentDocument;
   const view = page.defaultView.innerWidth;
   const clipped = element => element.closest(".scroll, dialog") !== null;
@@ -59,6 +59,12 @@ addEventListener("load", () => {
   const order = () => [head.ariaSort ?? "none", ...labels()];
   found.sorted = [order()];
   for (let click = 0; click < 3; click++) { head.querySelector("button").click(); found.sorted.push(order()); }
+  const number = page.querySelector("a.number");
+  const rows = page.getElementById(number.getAttribute("href").slice(1));
+  found.unfolded = [rows.open];
+  number.click();
+  await new Promise(done => setTimeout(done, 500));
+  found.unfolded.push(rows.open);
   report(found);
 });
 """

@@ -86,7 +86,7 @@ def test_whole_study(results):
     assert experts.cpu_seconds == pytest.approx(720 * jobs["train_expert"])
     assert experts.peak_memory_mib == 500.5
     assert [table.name for table in data.tables] == [f"table_{n}" for n in range(1, 6)]
-    assert [table.name for table in data.tables if table.picture] == ["table_1"]
+    assert [table.picture.title for table in data.tables if table.picture] == ["Table 1 as a heat map"]
     assert [figure.name for figure in data.figures] == [name for name in ARTEFACTS if name.startswith("figure_")]
     assert {figure.caption for figure in data.figures} == {"what it shows, n = 1 seed"}
 
@@ -133,6 +133,21 @@ def test_units_keep_their_state_outcome_power_and_remarks():
     assert c7.measured.count("(4 units)") == 2
 
 
+def test_units_know_their_runs():
+    """C3 looks at new agents and at SAC, C4 at scores; an agent that is missing is no run of any."""
+    c3, c4 = claims_of(claims_json(judge_all(names=("C3", "C4")), JUDGED))
+    for unit in c3.units:
+        assert {folder.split("/")[0] for folder in unit.folders} == {"transfer", "sac"}
+        assert len(unit.folders) == 2 * len(JUDGED.seeds)
+    assert all(folder.startswith("scores/single_target/mt_csirl/") for unit in c4.units for folder in unit.folders)
+    (c3,) = claims_of(claims_json(judge_all(change=_without_sac, names=("C3",)), JUDGED))
+    assert {folder.split("/")[0] for unit in c3.units for folder in unit.folders} == {"transfer"}
+
+
+def _without_sac(rows):
+    return rows.assign(value=rows["value"].mask(rows["stage"] == "train_sac"))
+
+
 def test_gates_are_counted_by_agent_task_and_cs_reward(results):
     settings, root = results
     gates = {(line.gate, line.task, line.cs_reward): line for line in collect(settings, root / "page.html").gates}
@@ -158,7 +173,9 @@ def test_links_lead_to_files(results):
     page = root / "results" / "report" / "index.html"
     storage.write_text(page, build_report(collect(settings, page)))
     links = [link for link in re.findall(r'href="([^"]+)"', page.read_text()) if not link.startswith(("#", "data:"))]
-    assert len(links) == 4 * 5 + 2 * 11 + 1
+    rows = [link for link in links if link.endswith("/gate.json")]
+    assert len(links) - len(rows) == 4 * 5 + 2 * 11 + 1
+    assert rows, "of demonstrations, whose gate is all that this study has"
     for link in links:
         assert (page.parent / link).is_file(), link
 

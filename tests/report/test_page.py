@@ -14,7 +14,7 @@ from mtcsirl.report.page import build_report
 from tests.report.browser import AXE_PLACES, CHROMIUM, audit, inspect
 from tests.report.made_up import FIGURES, TASKS, made_up_report
 
-SECTIONS = ["claims", "tables", "figures", "numbers", "gates", "run", "deviations", "rerun"]
+SECTIONS = ["claims", "tables", "figures", "numbers", "gates", "rows", "run", "deviations", "rerun"]
 needs_chromium = pytest.mark.skipif(CHROMIUM is None, reason="chromium is not installed: apt-get install chromium")
 
 
@@ -170,6 +170,36 @@ def test_notes_stand_where_their_kind_belongs(page):
     assert '1 setting differs from the paper&#39;s: <a href="#deviations">which</a>' in folded.replace("'", "&#39;")
 
 
+def test_a_number_leads_to_its_runs_and_their_command(page):
+    anchor = re.search(r'<a class="number" href="#(rows-\d+)">0.91±0.03', page).group(1)
+    entry = page.split(f'id="{anchor}"')[1].split("</details>")[0]
+    assert "2 runs, transfer/multi_target/mt_csirl/velocity/reach-wall/reach-wall-t0</summary>" in entry
+    assert (
+        '<a href="../transfer/multi_target/mt_csirl/velocity/reach-wall/reach-wall-t0/s0/evaluation.csv">s0</a>'
+        in entry
+    )
+    assert "s1 (not here)" in entry
+    command = (
+        "snakemake --cores 2 $(mtcsirl target transfer/multi_target/mt_csirl/velocity/reach-wall/reach-wall-t0/s{0,1})"
+    )
+    assert f"<code>{command}</code>" in entry
+
+
+def test_equal_runs_are_one_entry_and_numbers_without_runs_are_text(page):
+    assert page.count('<details class="rows"') == 2, "those of the table and those of a claim and a gate"
+    assert len(re.findall(r'<a class="number" href="#rows-2">', page)) == 12 * 2 + 2
+    assert re.search(r"<td>0.81±0.03 \(n=5\) ∈ †1</td>", page)
+
+
+def test_a_page_without_runs_says_so():
+    assert "No rows yet" in build_report(made_up_report(claims=(), gates=(), tables=()))
+
+
+def test_commands_of_runs_name_their_scale():
+    entry = build_report(made_up_report("smoke")).split('id="rows-1"')[1].split("</details>")[0]
+    assert "--configfile config/smoke.yaml $(mtcsirl target --scale smoke transfer/" in entry
+
+
 def test_every_table_leads_to_its_rows_and_its_command(page):
     article = page.split('id="table_1"')[1].split("</article>")[0]
     assert '<a href="../tables/table_1.csv">its rows (CSV)</a>' in article
@@ -263,6 +293,11 @@ def test_headings_leave_no_level_out(seen):
     assert levels[0] == 1
     assert levels.count(1) == 1
     assert all(b - a <= 1 for a, b in itertools.pairwise(levels))
+
+
+@needs_chromium
+def test_a_number_unfolds_its_rows(seen):
+    assert seen["unfolded"] == [False, True]
 
 
 @needs_chromium

@@ -13,7 +13,7 @@ from mtcsirl.study.code import artefact_code
 from mtcsirl.study.design import ARTEFACTS
 
 STYLE, PUBLISHED = "figures/mtcsirl.mplstyle", "results/published.yaml"
-PAGE = ("report/page.html", "report/page.css", "report/page.js")
+PAGE = ("report/page.html", "report/rows.html", "report/page.css", "report/page.js")
 
 
 def data_of(name: str) -> set[str]:

@@ -16,7 +16,8 @@ def rows(values, status="ok", tasks=("push-back",), metric="velocity"):
             state = status if isinstance(status, str) else status[seed]
             for policy, shift in (("stochastic", 0.0), ("deterministic", -0.1)):
                 table.append({"seed": seed, "task": task, "policy": policy, "kept": "kept", "metric": metric,
-                              "value": value + shift, "status": state, "diverged": 0})  # fmt: skip
+                              "value": value + shift, "status": state, "diverged": 0,
+                              "folder": f"{task}/s{seed}"})  # fmt: skip
     return pd.DataFrame(table)
 
 
@@ -28,6 +29,11 @@ def test_seeds_are_averaged_after_tasks():
     assert cell.deterministic == pytest.approx(0.5)
     assert cell.iqm.value == pytest.approx(np.mean([0.5, 0.6, 0.6, 0.7])), "of the six values, without the extremes"
     assert cell.iqm.low < cell.iqm.value < cell.iqm.high
+
+
+def test_a_cell_knows_the_runs_that_count():
+    cell = make_cell(rows([[0.4, 0.6], [np.nan, 0.7]], tasks=("a", "b")), "velocity", UNKNOWN)
+    assert cell.folders == ("a/s0", "b/s0", "b/s1"), "an agent without a number is no row of it"
 
 
 def test_inside_and_outside_the_papers_prediction_interval():

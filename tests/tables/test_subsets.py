@@ -48,6 +48,7 @@ def rows_of(name, table, results):
     if results == "none" or not [run for run in study if hasattr(run, "seed")]:
         return evaluation_rows(study, settings, partial=True)
     rows = evaluation(study, lambda agent: {}, spread=0.05)
+    rows["folder"] = rows["folder"].str.replace("results/", f"{settings.results}/")
     if results == "half":
         gone = np.arange(len(rows)) % 7 < 4
         rows.loc[gone, ["value", "status"]] = [np.nan, "missing"]

@@ -173,6 +173,7 @@ def _unit_json(unit: Unit) -> dict[str, Any]:
             "informative": None if unit.inside is None else not unit.spreads.extreme,
         },
         "notes": list(unit.notes),
+        "folders": list(unit.folders),
     }
 
 

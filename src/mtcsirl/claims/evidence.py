@@ -14,6 +14,8 @@ from mtcsirl.results.rows import KEY, MISSING, OK, STALE, select
 from mtcsirl.results.statistics import Summary, probability_of_improvement, summarise
 from mtcsirl.rewards.ground_truth import COMMON_SENSE_REWARDS
 from mtcsirl.settings import Settings
+from mtcsirl.study.design import design
+from mtcsirl.study.runs import IrlRun, Score
 
 
 @dataclass(frozen=True)
@@ -29,6 +31,12 @@ class Group:
     cs_reward: str
     target: float
     last: "Group | None" = None
+
+    @property
+    def folders(self) -> set[str]:
+        """Folders of the runs whose numbers count."""
+        known = [frame[frame[self.cs_reward].notna()] for frame in self.agents.values() if self.cs_reward in frame]
+        return {folder for frame in known for folder in frame["folder"]}
 
     def on(self, task: str) -> "Group":
         """The group on one of its tasks."""
@@ -186,6 +194,16 @@ class Evidence:
         place = self._scored_places.get((*source.key.values(), task))
         return self.points.iloc[[] if place is None else place]
 
+    def score_folders(self, source: "RewardSource", task: str) -> list[str]:
+        """Folders of the scores that ``scored`` reads, below the results."""
+        seeds = set(self.scored(source, task)["seed"]) if len(self.points) else set()
+        runs = [run for run in self._scores if (run.task, *_key_of(run.irl)) == (task, *source.key.values())]
+        return [run.folder for run in runs if run.irl.seed in seeds]
+
+    @cached_property
+    def _scores(self) -> tuple[Score, ...]:
+        return tuple(design(self.settings).scores)
+
     @cached_property
     def _scored_places(self) -> Mapping[Any, Any]:
         """Where the points of one source and task stand, all seeds: found once, for selecting them takes as long."""
@@ -193,10 +211,14 @@ class Evidence:
         return self.points.groupby(names).indices if len(self.points) else {}
 
 
+def _key_of(run: IrlRun) -> tuple[str, str, str, str]:
+    return run.experiment, run.method, run.cs_reward, run.source
+
+
 def _wide(rows: pd.DataFrame) -> pd.DataFrame:
     """One row per agent of the stochastic policy's rows, metrics as columns."""
     chosen = select(rows, policy="stochastic")
-    return chosen.pivot(index=[*KEY, "status"], columns="metric", values="value").reset_index()
+    return chosen.pivot(index=[*KEY, "status", "folder"], columns="metric", values="value").reset_index()
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -70,6 +71,8 @@ class Unit:
     paper_value: float = np.nan
     power: float = np.nan
     notes: tuple[str, ...] = ()
+    folders: tuple[str, ...] = ()
+    """Of the runs that were looked at, below the results."""
 
     @property
     def inside(self) -> bool | None:
@@ -142,6 +145,11 @@ def checked(evidence: Evidence, unit: Unit, rules: Rules, source: RewardSource |
 
     The last of ``groups`` that is plain SAC is asked for room between it and the target.
     """
+    results = Path(evidence.settings.results)
+    folders = sorted(
+        Path(folder).relative_to(results).as_posix() for folder in {one for group in groups for one in group.folders}
+    )
+    unit = replace(unit, folders=tuple(folders))
     seeds = [group.metric.n for group in groups]
     if min(seeds) == 0:
         return replace(unit, state=NOT_RUN, outcome="", reason="no agent has been trained for this, or none is usable")

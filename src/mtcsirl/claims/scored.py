@@ -66,6 +66,7 @@ def _unit(evidence: Evidence, rules: Rules, source: RewardSource, task: str, fou
         paper=printed,
         paper_value=printed.mean,
         notes=tuple(_notes(evidence.scores, source, task, found)) if found.partial.n else (),
+        folders=tuple(evidence.score_folders(source, task)),
     )
 
 

@@ -48,11 +48,12 @@ def register(verbs: Verbs) -> None:
         verbs,
         "target",
         _target,
-        does="print what to ask snakemake for to make one run: snakemake --cores 1 $(mtcsirl target sac/reach-t0/s0)",
+        does="print what to ask snakemake for to make runs: snakemake --cores 1 $(mtcsirl target sac/reach-t0/s0)",
         needs="nothing",
         writes="nothing",
     )
-    target.add_argument("folder", metavar="RUN", help="folder of the run below the results, as mtcsirl status names it")
+    named = "folder of a run below the results, as mtcsirl status names it"
+    target.add_argument("folders", nargs="+", metavar="RUN", help=named)
     add_study_settings(target)
 
     check = add_verb(
@@ -136,12 +137,14 @@ def _target(parsed: argparse.Namespace) -> None:
 
     settings = study_settings(parsed)
     results = Path(settings.results)
-    folder = Path(parsed.folder)
-    name = (folder.relative_to(results) if folder.is_relative_to(results) else folder).as_posix()
     runs = {run.folder: run for artefact in (None, *ABLATIONS) for run in design(settings, artefact)}
-    if name not in runs:
-        raise UserError(f"{parsed.folder}: is no run of the study at scale {settings.scale}; see mtcsirl status")
-    print(results / name / marker(identity_of(runs[name], settings).hash))
+    names = []
+    for folder in map(Path, parsed.folders):
+        names.append((folder.relative_to(results) if folder.is_relative_to(results) else folder).as_posix())
+        if names[-1] not in runs:
+            raise UserError(f"{folder}: is no run of the study at scale {settings.scale}; see mtcsirl status")
+    for name in names:
+        print(results / name / marker(identity_of(runs[name], settings).hash))
 
 
 def _verify(parsed: argparse.Namespace) -> None:

@@ -1,7 +1,7 @@
 """Reads what the DAG left and turns it into the content of the start page."""
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -62,6 +62,7 @@ def collect(settings: Settings, page: Path, *, partial: bool = False) -> ReportD
             page, (("every number (JSON)", claims.with_suffix(".json")), ("Markdown", claims.with_suffix(".md")))
         ),
         claims_picture=_optional_picture("claims_picture", "All verdicts", claims.with_suffix(".png")),
+        rows=_rows(settings, study, page),
         beforehand=str(judged.get("beforehand", "")),
     )
 
@@ -94,15 +95,27 @@ def _table(name: str, settings: Settings, page: Path) -> TableView:
     path = _picture_or_table(name, settings)
     table = Table.from_json(storage.read_json(path), path)
     files = tuple((text, path.with_suffix(f".{ending}")) for text, ending in TABLE_FILES)
-    picture = _optional_picture(f"{name}_picture", "As a heat map", path.with_suffix(".png"))
+    picture = _optional_picture(f"{name}_picture", f"{table.title} as a heat map", path.with_suffix(".png"))
     return TableView(name, _title(name), table, _links(page, files), picture)
 
 
 def _figure(name: str, settings: Settings, page: Path) -> FigureView:
     path = _picture_or_table(name, settings)
     png = storage.read_bytes(path)
-    links = _links(page, (("PDF", path.with_suffix(".pdf")), ("PNG", path)))
+    record = Path(settings.results) / "artefacts" / name / "identity.json"
+    links = _links(page, (("PDF", path.with_suffix(".pdf")), ("PNG", path), ("its runs (JSON)", record)))
     return FigureView(name, _title(name), caption_of(png), png, links)
+
+
+ROWS = ("evaluation.csv", "scores.csv", "gate.json")
+"""The file of a run that holds its rows: the first of these that its stage writes."""
+
+
+def _rows(settings: Settings, study: Runs, page: Path) -> dict[str, str]:
+    """Where the rows of each run are that is there."""
+    files = {run.folder: next(name for name in ROWS if name in OUTPUTS[run.stage]) for run in study}
+    paths = {folder: Path(settings.results) / folder / name for folder, name in files.items()}
+    return {folder: address for folder, path in paths.items() for _, address in _links(page, (("", path),))}
 
 
 def _optional_picture(name: str, title: str, path: Path) -> FigureView | None:
@@ -197,19 +210,20 @@ def _unit(found: dict[str, Any]) -> UnitLine:
         value=found["measure"]["value"],
         remarks=tuple(filter(None, [power, *found["notes"]])),
         judged=found["answer"] != SHOWN,
+        folders=tuple(found["folders"]),
     )
 
 
 def _gates(study: Runs, results: Path) -> tuple[GateLine, ...]:
     """One line per kind of agent, task and cs-reward; an IRL run has one gate per generator."""
-    groups: dict[tuple[str, str, str], list[dict[str, Any]]] = {}
+    groups: dict[tuple[str, str, str], list[tuple[str, dict[str, Any]]]] = {}
     for run in study:
         path = results / run.folder / "gate.json"
         if "gate.json" in OUTPUTS[run.stage] and path.is_file():
             for task, gate in _members(run, storage.read_json(path)):
                 key = (_agent_name(run), task, _cs_reward(run))
-                groups.setdefault(key, []).append(gate)
-    return tuple(_gate_line(key, gates) for key, gates in groups.items())
+                groups.setdefault(key, []).append((run.folder, gate))
+    return tuple(_gate_line(key, *zip(*found, strict=True)) for key, found in groups.items())
 
 
 def _members(run: AnyRun, gate: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
@@ -240,7 +254,7 @@ def _cs_reward(run: AnyRun) -> str:
     return str(getattr(getattr(run, "irl", run), "cs_reward", ""))
 
 
-def _gate_line(key: tuple[str, str, str], gates: list[dict[str, Any]]) -> GateLine:
+def _gate_line(key: tuple[str, str, str], folders: Sequence[str], gates: Sequence[dict[str, Any]]) -> GateLine:
     metrics = [gate["metric"] for gate in gates if gate.get("metric") is not None]
     return GateLine(
         *key,
@@ -248,6 +262,7 @@ def _gate_line(key: tuple[str, str, str], gates: list[dict[str, Any]]) -> GateLi
         agents=len(gates),
         success=sum(gate["success"] for gate in gates) / len(gates),
         metric=sum(metrics) / len(metrics) if metrics else None,
+        folders=tuple(dict.fromkeys(folders)),
     )
 
 

@@ -1,7 +1,7 @@
 """What the start page shows, as plain data: no file is read and none is written here."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from mtcsirl.tables.table import Table
 
@@ -43,6 +43,8 @@ class UnitLine:
     value: float | None = None
     remarks: tuple[str, ...] = ()
     judged: bool = True
+    folders: tuple[str, ...] = ()
+    """Of the runs that were looked at, below the results."""
 
 
 @dataclass(frozen=True)
@@ -104,6 +106,7 @@ class GateLine:
     agents: int
     success: float
     metric: float | None
+    folders: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -145,5 +148,7 @@ class ReportData:
     links: tuple[tuple[str, str], ...] = ()
     claims_picture: FigureView | None = None
     """All verdicts on one page, where it has been drawn."""
+    rows: Mapping[str, str] = field(default_factory=dict)
+    """Folder of a run -> address of its rows, of those that are there."""
     beforehand: str = ""
     """What was fixed before the runs and what was not."""

@@ -52,5 +52,18 @@ for (const picture of document.querySelectorAll("figure img")) {
 }
 dialog.addEventListener("click", event => { if (event.target !== large) dialog.close(); });
 
-// Paper unfolds nothing by itself.
-addEventListener("beforeprint", () => document.querySelectorAll("details").forEach(one => { one.open = true; }));
+// A link to something folded unfolds it, also when it is followed a second time.
+const unfold = address => {
+  const target = document.getElementById(address.slice(1));
+  for (let one = target?.closest("details"); one; one = one.parentElement.closest("details")) one.open = true;
+};
+document.addEventListener("click", event => {
+  const link = event.target.closest("a[href^='#']");
+  if (link) unfold(link.getAttribute("href"));
+});
+addEventListener("hashchange", () => unfold(location.hash));
+unfold(location.hash);
+
+// Paper unfolds nothing by itself; lists of files are of no use on it.
+addEventListener("beforeprint",
+  () => document.querySelectorAll("details:not(.rows)").forEach(one => { one.open = true; }));

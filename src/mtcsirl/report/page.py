@@ -11,6 +11,7 @@ from markupsafe import Markup
 from mtcsirl.claims.judging import BLOCKED, MET, NOT_MET, NOT_RUN, SHOWN, TOO_FEW, UNCLEAR
 from mtcsirl.claims.unit_text import COLUMNS
 from mtcsirl.report.content import Claim, FigureView, ReportData
+from mtcsirl.report.sources import entries
 from mtcsirl.results.notes import Kind, of_kind, scale_notes
 
 VERDICTS = {
@@ -51,9 +52,15 @@ def build_report(data: ReportData) -> str:
     # Each name is a constant where its file is read: so the identity of the page knows these files.
     template = resources.files("mtcsirl.report").joinpath("page.html").read_text(encoding="utf-8")
     styles = resources.files("mtcsirl.report").joinpath("page.css").read_text(encoding="utf-8")
+    rows = resources.files("mtcsirl.report").joinpath("rows.html").read_text(encoding="utf-8")
     script = resources.files("mtcsirl.report").joinpath("page.js").read_text(encoding="utf-8")
+    known = entries(data)
+    command = f"snakemake --cores 2 {CONFIGS.get(data.run.scale, '')}"
+    scale = f" --scale {data.run.scale}" if data.run.scale in CONFIGS else ""
     return environment.from_string(template).render(
         data=data,
+        anchor=lambda folders: known[tuple(folders)].anchor,
+        rows=Markup(environment.from_string(rows).render(entries=list(known.values()), command=command, scale=scale)),
         css=Markup(styles),
         script=Markup(script),
         script_hash=b64encode(sha256(script.encode()).digest()).decode(),
@@ -68,7 +75,7 @@ def build_report(data: ReportData) -> str:
         warnings=scale_notes(data.run.scale),
         beside=lambda notes: of_kind(notes, *BESIDE),
         of_kind=of_kind,
-        command=f"snakemake --cores 2 {CONFIGS.get(data.run.scale, '')}",
+        command=command,
     )
 
 

@@ -63,6 +63,8 @@ class Cell:
     iqm: Estimate
     expected: int
     marks: dict[str, int] = field(default_factory=dict)
+    folders: tuple[str, ...] = ()
+    """Of the runs whose rows were averaged."""
 
     @property
     def comparison(self) -> Comparison:
@@ -152,6 +154,7 @@ def make_cell(rows: pd.DataFrame, metric: str, paper: Summary, scale: float = 1.
         iqm=_interquartile(chosen, scale),
         expected=chosen["seed"].nunique(),
         marks=_marks(chosen),
+        folders=tuple(sorted(set(chosen.loc[chosen["value"].notna(), "folder"]))),
     )
 
 

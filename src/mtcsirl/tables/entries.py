@@ -1,7 +1,8 @@
 """How tables of results are laid out: ours and the paper's in neighbouring columns, intervals in a second grid."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -85,12 +86,13 @@ class Layout:
         ]
         return pd.DataFrame(rows)
 
-    def grid(self) -> Grid:
-        """Ours and the paper's side by side."""
+    def grid(self, results: Path) -> Grid:
+        """Ours and the paper's side by side; folders of runs are those below ``results``."""
         columns: list[Column] = []
         for one in self.quantities:
             columns += [Column("ours", one.title), Column("paper", one.title)] if one.published else [Column(one.title)]
-        return Grid(self.corner, tuple(columns), tuple(self._lines(self._texts)))
+        lines = self._lines(self._texts, [i for i, column in enumerate(columns) if column.title != "paper"], results)
+        return Grid(self.corner, tuple(columns), tuple(lines))
 
     def intervals(self) -> Grid | None:
         """The t-interval of each of our means, and where the paper predicts it; None where nothing has an interval."""
@@ -119,13 +121,18 @@ class Layout:
         if lacking:
             yield Note("gap", f"incomplete: {lacking} of {len(self.cells)} cells lack seeds")
 
-    def _lines(self, texts: Callable[[Row], tuple[list[str], list[int]]]) -> Iterator[Line]:
+    def _lines(
+        self, texts: Callable[[Row], tuple[list[str], list[int]]], ours: Sequence[int] = (), results: Path = Path()
+    ) -> Iterator[Line]:
+        """``ours``: the columns of our numbers, which know their runs."""
         for number, (heading, rows) in enumerate(self.sections):
             if heading:
                 yield Line(heading, rule=number > 0, section=True)
             for row in rows:
                 own, strong = texts(row)
-                yield Line(row.label, tuple(own), row.rule, tuple(strong))
+                cells = dict(zip(ours, (entry.cell for entry in row.entries), strict=False))
+                folders = {i: below(results, cell.folders) for i, cell in cells.items() if cell.folders}
+                yield Line(row.label, tuple(own), row.rule, tuple(strong), folders=folders)
 
     def _texts(self, row: Row) -> tuple[list[str], list[int]]:
         """The texts of a row and which of them are bold."""
@@ -148,12 +155,17 @@ class Layout:
         return texts, []
 
 
+def below(results: Path, folders: Iterable[str]) -> tuple[str, ...]:
+    """Folders of runs as their keys name them, wherever the results lie."""
+    return tuple(Path(folder).relative_to(results).as_posix() for folder in folders)
+
+
 def result_table(name: str, caption: str, layout: Layout, settings: Settings, notes: Sequence[Note] = ()) -> Table:
     """The table of a layout: signs explained, scale and deviations in its notes."""
     return Table(
         name=name,
         caption=caption,
-        grid=layout.grid(),
+        grid=layout.grid(Path(settings.results)),
         notes=(
             study_note(settings),
             *layout.gap_notes(),

@@ -1,7 +1,7 @@
 """Printed rows and columns: what Markdown, LaTeX and the report show of a table."""
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import groupby
 from typing import Any
 
@@ -19,7 +19,7 @@ class Line:
     """One printed line: a label and a text per column.
 
     ``rule`` draws a rule above it, the columns ``strong`` are bold. A ``section`` has no texts: its label heads the
-    lines below it.
+    lines below it. ``folders``: column -> the runs that its number was made from.
     """
 
     label: str
@@ -27,6 +27,7 @@ class Line:
     rule: bool = False
     strong: tuple[int, ...] = ()
     section: bool = False
+    folders: Mapping[int, tuple[str, ...]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -72,7 +73,7 @@ class Grid:
         """Plain data; defaults are left out."""
         lines = [
             {"label": line.label, "texts": list(line.texts), "rule": line.rule, "strong": list(line.strong),
-             "section": line.section}
+             "section": line.section, "folders": {str(column): list(own) for column, own in line.folders.items()}}
             for line in self.lines
         ]  # fmt: skip
         columns = [{"title": column.title, "group": column.group} for column in self.columns]
@@ -89,6 +90,7 @@ class Grid:
                 bool(line["rule"]),
                 tuple(map(int, line["strong"])),
                 bool(line["section"]),
+                {int(column): tuple(map(str, own)) for column, own in line["folders"].items()},
             )
             for line in data["lines"]
         )
