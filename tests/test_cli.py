@@ -296,6 +296,7 @@ def test_status_verb_on_an_empty_folder(small: Settings, capsys: pytest.CaptureF
     assert "time left" in text
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGTERM, 143), (signal.SIGINT, 130)])
 def test_a_stopped_job_leaves_no_half_written_file(tmp_path: Path, number: int, code: int) -> None:
     run = tmp_path / "run"
@@ -315,6 +316,7 @@ def test_a_stopped_job_leaves_no_half_written_file(tmp_path: Path, number: int, 
     assert not storage.is_locked(run)
 
 
+@pytest.mark.slow
 def test_a_killed_job_goes_on_and_ends_with_the_same_bytes(tmp_path: Path) -> None:
     changes = {"steps": 1500, "sac.minibatch": 32, "sac.updates_per_step": 0.1, "progress.checkpoint_every": 500}
     changes |= {"sac.hidden_sizes": [16, 16], "evaluation.episodes": 1, "evaluation.episode_steps": 100}

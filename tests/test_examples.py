@@ -17,6 +17,8 @@ from mtcsirl.settings.runs import DemonstrationRunSettings
 from tests.conftest import CHECKOUT
 from tests.rewards.test_learned import learned
 
+pytestmark = pytest.mark.slow
+
 EXAMPLES = sorted((CHECKOUT / "examples").glob("*.py"))
 
 

@@ -6,6 +6,8 @@ from pathlib import Path
 
 import pytest
 
+pytestmark = pytest.mark.slow
+
 EXTRAS = {"tensorboard": "tests/agents/test_training.py", "minari": "tests/exports/test_minari.py"}
 HIDE = """
 import importlib.abc, sys

@@ -15,6 +15,7 @@ from mtcsirl.settings.runs import baseline_run, expert_run, irl_run, transfer_ru
 STAGES_ON_GPU = {"train_expert", "train_sac", "learn_reward", "transfer"}
 
 
+@pytest.mark.slow
 def test_the_benchmark_prints_a_rate_for_every_size_and_the_cost_of_both_scales(
     capsys: pytest.CaptureFixture[str],
 ) -> None:

@@ -6,6 +6,8 @@ from pathlib import Path
 
 import pytest
 
+pytestmark = pytest.mark.slow
+
 STAGES = ("train_expert", "train_sac", "collect_demonstrations", "learn_reward", "transfer", "score_reward")
 LEFT_OUT = (
     *("pandas", "pyarrow", "scipy", "matplotlib", "stable_baselines3", "snakemake", "jinja2", "PIL", "minari"),

@@ -52,6 +52,7 @@ def alone(jobs, tmp_path) -> list[dict[str, bytes]]:
     return [run([job], tmp_path / f"alone_{index}")[0] for index, job in enumerate(jobs)]
 
 
+@pytest.mark.slow
 def test_any_batch_in_any_order_with_and_without_workers(jobs, alone, tmp_path) -> None:
     assert len({agent["policy.safetensors"] for agent in alone}) == len(jobs), "they tell each other apart"
     batches = [([0, 1], 0), ([3, 0, 2], 0), ([4, 3, 2, 1, 0], 0), ([1, 4, 0], 1), ([2, 1, 3], 2)]
@@ -62,6 +63,7 @@ def test_any_batch_in_any_order_with_and_without_workers(jobs, alone, tmp_path) 
             assert not different, (order, workers, index)
 
 
+@pytest.mark.slow
 def test_a_batch_that_was_killed_goes_on_alone_and_runs_that_were_killed_go_on_in_a_batch(
     jobs, alone, tmp_path
 ) -> None:
@@ -92,6 +94,7 @@ def test_the_checkpoint_of_an_agent_holds_the_same_too(jobs, tmp_path) -> None:
     assert all(torch.equal(tensor, others[name]) for name, tensor in tensors.items())
 
 
+@pytest.mark.slow
 def test_the_reference_learner_in_a_batch_too(jobs, tmp_path) -> None:
     def reference(job: AgentJob) -> AgentJob:
         rate = {"temperature_learning_rate": job.settings.sac.policy_learning_rate, "learner": "stable_baselines3"}

@@ -15,6 +15,8 @@ from mtcsirl.files import storage
 from mtcsirl.files.checkpoint import load_checkpoint, save_checkpoint
 from tests.faults.harness import LONG, Stage, contents, ended, fork
 
+pytestmark = pytest.mark.slow
+
 TENSORS = {
     "rows": torch.arange(60.0).reshape(2, 10, 3)[:, :7],
     "count": torch.tensor(7),

@@ -12,6 +12,8 @@ import pytest
 from mtcsirl.files import storage
 from tests.faults.harness import LONG, Stage, contents, ended, fork, seconds_of
 
+pytestmark = pytest.mark.slow
+
 ENDINGS = {signal.SIGKILL: -9, signal.SIGTERM: 143, signal.SIGINT: 130}
 TRIES = 30 if LONG else 2
 

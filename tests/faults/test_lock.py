@@ -17,6 +17,8 @@ from mtcsirl.errors import UserError
 from mtcsirl.files.lock import NAME, HeldError, is_locked, locked
 from tests.faults.harness import LONG, ended, fork
 
+pytestmark = pytest.mark.slow
+
 SECONDS = 60.0 if LONG else 2.0
 PROCESSES = 8
 WITHOUT = (errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP)

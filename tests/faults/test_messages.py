@@ -8,6 +8,8 @@ import pytest
 
 from tests.faults.command import EXPECTED, environment, in_shell, mtcsirl, one_line, train
 
+pytestmark = pytest.mark.slow
+
 REDIRECTED = {
     "a pipe whose reader is gone": "2>&1 | head -c 1 > /dev/null",
     "closed streams": ">&- 2>&- <&-",

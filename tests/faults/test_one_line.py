@@ -15,6 +15,8 @@ from mtcsirl.extensions import load_extensions
 from tests.faults.command import environment, mtcsirl, one_line, train
 from tests.faults.harness import LONG
 
+pytestmark = pytest.mark.slow
+
 
 def _run(command: list[str], **options: object) -> subprocess.CompletedProcess[str]:
     return subprocess.run(command, capture_output=True, text=True, **options)  # type: ignore[call-overload]

@@ -15,6 +15,8 @@ from mtcsirl.files import stop
 from tests.faults.command import RESULTS, train
 from tests.faults.harness import contents
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(autouse=True)
 def _heeding_ctrl_c() -> Iterator[None]:

@@ -13,6 +13,8 @@ from mtcsirl.study.standing import DONE, STALE
 from tests.conftest import CHECKOUT, needs_rendering
 from tests.hidden import environment
 
+pytestmark = pytest.mark.slow
+
 SOURCE = CHECKOUT / "src"
 
 

@@ -8,6 +8,8 @@ from mtcsirl.settings import Settings
 from tests.figures.made_up import made_up_data
 from tests.subsets import SUBSETS, subset
 
+pytestmark = pytest.mark.slow
+
 DRAWN = [name for name in FIGURES if not figure_spec(name).rendered]
 
 

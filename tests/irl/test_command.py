@@ -28,6 +28,7 @@ def test_several_targets_may_be_one_where_the_study_says_so(demonstrations, tmp_
     assert read_record(tmp_path / "run").identity.key["experiment"] == key
 
 
+@pytest.mark.slow
 def test_workers_change_no_byte(demonstrations, tmp_path):
     words = [*learn_reward(*demonstrations, seed=7), "--scale", "smoke", "--set", "irl.iterations=1"]
     for workers in ("0", "2"):

@@ -18,6 +18,8 @@ from mtcsirl.study.design import design
 from mtcsirl.tables import TABLES
 from tests.claims.made_up import SETTINGS, as_the_paper_says, evaluation, judge_all, rows_of, scores
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def findings():

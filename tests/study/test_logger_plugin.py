@@ -10,6 +10,8 @@ import pytest
 
 from tests.conftest import CHECKOUT
 
+pytestmark = pytest.mark.slow
+
 SNAKEFILE = """
 rule all:
     input: expand("out/{n}/done", n=range(JOBS))

@@ -9,6 +9,8 @@ import time
 from contextlib import suppress
 from pathlib import Path
 
+import pytest
+
 from mtcsirl.settings import Settings
 from mtcsirl.study.design import design
 from mtcsirl.study.status import before_it_starts
@@ -37,6 +39,7 @@ def watch(settings: Settings) -> subprocess.Popen[str]:
     return subprocess.Popen(command, env=env, text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
 
 
+@pytest.mark.slow
 def test_a_watched_study_is_a_line_per_change_in_a_file_and_ends_with_it(settings: Settings) -> None:
     runs = list(design(settings))
     for run in runs[:-1]:

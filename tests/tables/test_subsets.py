@@ -20,7 +20,7 @@ from tests.results.made_up import evaluation
 from tests.subsets import SUBSETS, subset
 
 # the same code as in test_tables.py and test_heat_maps.py, many times over: without coverage, in two thirds of the time
-pytestmark = pytest.mark.no_cover
+pytestmark = [pytest.mark.slow, pytest.mark.no_cover]
 HEAT_MAPS = {"table_1": "action_norm", "table_3": "velocity"}
 LEFT_OUT = {
     ("table_1", "velocity"): "not part of this study, cs-reward: action norm",
