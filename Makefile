@@ -9,7 +9,7 @@ SMOKE := --configfile config/smoke.yaml
 # the tools find each other, and every job finds `mtcsirl`, without an activated environment
 export PATH := $(CURDIR)/$(BIN):$(PATH)
 
-.PHONY: help setup replicate smoke quick test lint bench bench-node docs image audit constraints
+.PHONY: help setup replicate smoke quick test coverage lint bench bench-node docs image audit constraints
 
 help:  ## print this list
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
@@ -51,9 +51,12 @@ quick: setup  ## what one runs before each commit, under two minutes on two idle
 	ruff format --check
 	pytest -n $(CORES) --dist loadfile -m "not slow and not dag" --ignore tests/dag
 
-test: setup  ## all tests, with coverage; those that run the smoke DAG come last, as it uses the cores itself
-	pytest -n $(CORES) --dist loadfile --no-loadscope-reorder -m "not dag" --cov
+test: setup  ## all tests; one process more than cores, as the Slurm tests mostly wait; the smoke DAG takes the cores itself
+	pytest -n $$(($(CORES) + 1)) --dist loadfile --no-loadscope-reorder -m "not dag"
 	pytest -n $(CORES) --dist loadgroup -m dag
+
+coverage: setup  ## what the tests reach, but for those that run the smoke DAG; measuring it takes half as long again
+	pytest -n $(CORES) --dist loadfile --no-loadscope-reorder -m "not dag" --cov
 
 lint: setup  ## formatting, lint and types, all of which must be clean
 	ruff check

@@ -153,7 +153,7 @@ class Cluster:
 @contextmanager
 def started(more: str = "") -> Iterator[Cluster]:
     """A cluster in a new folder of its own (directly in /tmp: the path of a socket must be short), gone afterwards."""
-    folder = Path(tempfile.mkdtemp(prefix="slurm-", dir="/tmp"))
+    folder = Path(tempfile.mkdtemp(prefix=f"slurm-{os.getpid()}-", dir="/tmp"))
     cluster = Cluster(folder, more)
     try:
         cluster.start()

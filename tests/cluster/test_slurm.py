@@ -18,7 +18,7 @@ from mtcsirl.study.plan import Request, load_rates, request
 from tests.cluster.conftest import Controller, Controllers
 from tests.cluster.slurm import Cluster, until
 
-pytestmark = [pytest.mark.dag, pytest.mark.xdist_group("slurm")]
+pytestmark = pytest.mark.slow
 TABLE = "methods: [mt_csirl]\ncs_rewards: [velocity]\n"
 LONG = "seeds: [0, 1, 2]\nbaseline: {steps: {default: 20000}}\nprogress: {checkpoint_every: 1000, select_every: 5000}\n"
 """Baselines of about ten seconds each, with a checkpoint every half second."""

@@ -9,7 +9,7 @@ from mtcsirl import slurm
 from mtcsirl.errors import UserError
 from tests.cluster.slurm import Cluster, NotStartedError, lacking, main, started
 
-pytestmark = [pytest.mark.dag, pytest.mark.xdist_group("slurm")]
+pytestmark = pytest.mark.slow
 
 
 class Waiting:
@@ -99,7 +99,7 @@ def test_what_is_not_installed_is_named() -> None:
 def test_a_daemon_that_cannot_start_says_why_and_none_is_left(cluster: Cluster) -> None:
     with pytest.raises(NotStartedError, match="slurmctld does not start: "), started("SelectType=select/none_such\n"):
         pass
-    others = [path for path in Path("/tmp").glob("slurm-*/slurm.conf") if path.parent != cluster.folder]
+    others = [path for path in Path("/tmp").glob(f"slurm-{os.getpid()}-*/slurm.conf") if path.parent != cluster.folder]
     assert others == []
 
 
