@@ -40,6 +40,7 @@ def register(verbs: Verbs) -> None:
     add_artefact(plan)
     plan.add_argument("--rates", type=path, default=None, metavar="FILE", help="what calibrate wrote; default: shipped")
     plan.add_argument("--cores", type=positive, default=2, metavar="N", help="cores to spread the jobs over; default 2")
+    plan.add_argument("--against-runs", action="store_true", help="hold it against the runs that are done, by stage")
     add_study_settings(plan)
 
     status.register(verbs)
@@ -103,6 +104,9 @@ def _plan(parsed: argparse.Namespace) -> None:
     from mtcsirl.study.plan import CALIBRATION, load_rates, plan, wall_hours
 
     settings, rates = study_settings(parsed), load_rates(parsed.rates or CALIBRATION)
+    if parsed.against_runs:
+        _print_spent(settings, parsed.target, rates)
+        return
     stages = plan(design(settings, parsed.target), settings, rates)
     lines = [
         (s.stage, s.jobs, f"{s.core_hours:.1f}", f"{s.longest_minutes:.1f}", f"{s.memory_mib:.0f}", f"{s.disk_gib:.2f}")
@@ -117,6 +121,21 @@ def _plan(parsed: argparse.Namespace) -> None:
         print(note)
     if parsed.target is None:
         _print_artefacts(settings, rates)
+
+
+def _print_spent(settings: "Settings", target: str | None, rates: "Rates") -> None:
+    """CPU seconds of done runs against those of the plan; its rates are of one machine, named below."""
+    from mtcsirl.study.spent import spent
+
+    lines = []
+    for s in spent(design(settings, target), settings, rates):
+        ratios = f"{s.ratio:.2f}", f"{s.low:.2f} to {s.high:.2f}"
+        lines.append((s.stage, s.made, s.runs, f"{s.planned:.1f}", f"{s.measured:.1f}", *ratios, s.processor))
+    if not lines:
+        raise UserError(f"{settings.results}: no run is done to hold the plan against; see mtcsirl status")
+    head = ("stage", "made", "runs", "planned, s", "measured, s", "ratio", "5 % to 95 %", "processor")
+    _print_table(head, lines)
+    print(f"\nCPU seconds of a run without start-up; planned by the rates of: {rates.machine}")
 
 
 def _print_artefacts(settings: "Settings", rates: "Rates") -> None:
