@@ -55,7 +55,7 @@ test: setup  ## all tests; one process more than cores, as the Slurm tests mostl
 	pytest -n $$(($(CORES) + 1)) --dist loadfile --no-loadscope-reorder -m "not dag"
 	pytest -n $(CORES) --dist loadgroup -m dag
 
-coverage: setup  ## what the tests reach, but for those that run the smoke DAG; measuring it takes half as long again
+coverage: setup  ## what the tests reach, but for those that run the smoke DAG; measuring it takes time
 	pytest -n $(CORES) --dist loadfile --no-loadscope-reorder -m "not dag" --cov
 
 lint: setup  ## formatting, lint and types, all of which must be clean

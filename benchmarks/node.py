@@ -4,9 +4,9 @@
     python -m benchmarks.node --device cuda --workers 15
 
 Agents are experts of velocity on reach-wall in lockstep, at the desk scale and with the paper's settings; the share of
-IRL is MT-CSIRL at the desk scale, its steps those of
-all T generators together. A scale costs the steps of all agents and generators of its plan over the best rate measured
-for them; demonstrations, scores and evaluations are left out.
+the environment is the part of the time in which the learner waits for it. IRL is MT-CSIRL at the desk scale, its steps
+those of all T generators together. A scale costs the steps of all agents and generators of its plan over the best rate
+measured for them; demonstrations, scores and evaluations are left out.
 """
 
 import argparse

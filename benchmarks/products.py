@@ -6,13 +6,13 @@ OPENBLAS_CORETYPE, where it is set, decides which kernels numpy takes; the first
 """
 
 import os
-from time import process_time
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import torch
 
+from benchmarks.sides import seconds
 from mtcsirl.agents import products
 from mtcsirl.agents.sac import FusedSac
 from mtcsirl.files.provenance import machine
@@ -29,11 +29,8 @@ def milliseconds(agents: int) -> float:
     batch = torch.randn(agents, b, 39), torch.rand(agents, b, 4), torch.randn(agents, b), torch.randn(agents, b, 39)
     count, found = max(1, UPDATES // agents), []
     for _ in range(PARTS + 1):  # the first warms up
-        started = process_time()
-        for _ in range(count):
-            learner.update(*batch)
-        found.append((process_time() - started) / count / agents)
-    return 1000 * min(found[1:])
+        found.append(seconds(lambda: learner.update(*batch), count))
+    return 1000 * min(found[1:]) / agents
 
 
 def main() -> None:

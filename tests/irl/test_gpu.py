@@ -28,7 +28,7 @@ def on_cuda(settings: IrlRunSettings | AgentRunSettings) -> IrlRunSettings | Age
     return settings.model_copy(update={"sac": settings.sac.model_copy(update={"device": "cuda"})})
 
 
-def a_reward(small: int = 0) -> LearnedReward:
+def a_reward(seed: int = 0) -> LearnedReward:
     architecture = {
         "kind": "perceptron",
         "observation_size": 39,
@@ -37,7 +37,7 @@ def a_reward(small: int = 0) -> LearnedReward:
         "output_scale": 1.0,
         "shaping": False,
     }
-    network = RewardNetwork(architecture, random=torch.Generator().manual_seed(small))
+    network = RewardNetwork(architecture, random=torch.Generator().manual_seed(seed))
     return LearnedReward(network, "mt_csirl", "velocity", "mapped", (("reach", 0),))
 
 
