@@ -68,8 +68,9 @@ lint: setup  ## formatting, lint and types, all of which must be clean
 docs: setup  ## the pages of docs/ as a searchable site, build/site/index.html; a broken link ends it
 	NO_MKDOCS_2_WARNING=1 python -m mkdocs build
 
-bench: setup  ## measured ratios against stable-baselines3, stock Meta-World and imitation
-	sh benchmarks/imitation_environment.sh
+bench: setup  ## measured ratios against stable-baselines3, sbx, stock Meta-World and imitation
+	sh benchmarks/peer_environment.sh imitation
+	sh benchmarks/peer_environment.sh sbx
 	python -m benchmarks
 
 bench-node: setup  ## what this machine trains a second, on its GPU if it has one: eight minutes

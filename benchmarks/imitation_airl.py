@@ -1,6 +1,6 @@
 """imitation's AIRL with stable-baselines3's SAC, for benchmarks/irl_steps.py and tests/irl/test_equal_to_imitation.py.
 
-Runs in the environment that benchmarks/imitation_environment.sh makes and imports nothing of this suite:
+Runs in the environment that `sh benchmarks/peer_environment.sh imitation` makes and imports nothing of this suite:
 
     build/imitation/bin/python benchmarks/imitation_airl.py serve SETTINGS   one round per line of standard input
     build/imitation/bin/python benchmarks/imitation_airl.py record FILE      logits and losses of a fixed batch

@@ -11,15 +11,14 @@ CPU seconds of that thread.
 Plain SAC trains on the task reward of reach-wall with as many updates, by the same engine: a ratio of 0.8 says that an
 IRL step costs 1.25 times its step. imitation has AIRL on stable-baselines3's SAC with the same numbers, but for the
 gradient penalty, which it lacks. It cannot import Meta-World 3, so there both sides step an environment of random
-numbers that costs nothing. Its environment is made by benchmarks/imitation_environment.sh; without it that row is left
-out.
+numbers that costs nothing. Its environment is made by `sh benchmarks/peer_environment.sh imitation`; without it that
+row is left out.
 """
 
 import cProfile
 import json
 import os
 import pstats
-import subprocess
 import tempfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -31,7 +30,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 import numpy as np
 import torch
 
-from benchmarks.sides import Row, command, row, seconds
+from benchmarks.sides import Row, command, peer, row, seconds, served
 from mtcsirl.agents.jobs import AgentJob
 from mtcsirl.agents.sac import FusedSac
 from mtcsirl.agents.training import Training
@@ -47,8 +46,6 @@ from mtcsirl.settings import Settings
 from mtcsirl.settings.runs import AgentRunSettings, DemonstrationRunSettings, IrlRunSettings, baseline_run, irl_run
 from mtcsirl.transitions import Transitions
 
-HERE = Path(__file__).parent
-IMITATION = HERE.parent / "build/imitation/bin/python"
 TASK, STEPS, EPISODES = "reach-wall", 500, 20
 
 
@@ -56,16 +53,16 @@ def measure(rounds: int = 5) -> Iterator[Row]:
     """Rows of environment steps a second against plain SAC and, where its environment is made, imitation."""
     turn = _irl_on_meta_world()
     yield _row("mt_csirl, reach-wall", "plain SAC of the same engine", turn, _timed(_plain_sac(rounds)), rounds)
-    if IMITATION.exists():
-        with _Imitation() as theirs:
+    if peer("imitation").exists():
+        with served("imitation", "imitation_airl.py", "serve", _like_ours()) as theirs:
             yield _row("mt_csirl, steps for free", "imitation 1.0.1 AIRL, SB3 2.2.1 SAC", _irl(), theirs, rounds)
 
 
-def _row(setting: str, peer: str, ours: Callable[[], Any], theirs: Callable[[], float], rounds: int) -> Row:
+def _row(setting: str, against: str, ours: Callable[[], Any], theirs: Callable[[], float], rounds: int) -> Row:
     own = _timed(ours)
     for turn in (own, own, theirs, theirs):  # random steps, first updates, a memory that is not empty
         turn()
-    return row("irl_steps", setting, peer, [[own(), theirs()] for _ in range(rounds)], STEPS)
+    return row("irl_steps", setting, against, [[own(), theirs()] for _ in range(rounds)], STEPS)
 
 
 def _timed(call: Callable[[], Any]) -> Callable[[], float]:
@@ -125,13 +122,12 @@ def _irl() -> Callable[[], None]:
     ).iterate
 
 
-class _Imitation:
-    """The other process: one call is one round of imitation's AIRL, in CPU seconds of its thread."""
-
-    def __enter__(self) -> Callable[[], float]:
-        settings = _settings()
-        irl, sac = settings.irl, settings.sac
-        same = {
+def _like_ours() -> str:
+    """Our numbers under the names that imitation_airl.py takes."""
+    settings = _settings()
+    irl, sac = settings.irl, settings.sac
+    return json.dumps(
+        {
             "learning_rate": sac.policy_learning_rate,
             "generator_memory": irl.generator_memory,
             "steps_per_iteration": irl.steps_per_iteration,
@@ -146,23 +142,7 @@ class _Imitation:
             "demonstrations": EPISODES * STEPS,
             "generator_replay": irl.generator_replay,
         }
-        command = [str(IMITATION), "-W", "ignore", str(HERE / "imitation_airl.py"), "serve", json.dumps(same)]
-        self._process = subprocess.Popen(
-            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
-        )
-        return self._turn
-
-    def _turn(self) -> float:
-        assert self._process.stdin is not None
-        assert self._process.stdout is not None
-        self._process.stdin.write("\n")
-        self._process.stdin.flush()
-        return float(self._process.stdout.readline())
-
-    def __exit__(self, *exception: object) -> None:
-        assert self._process.stdin is not None
-        self._process.stdin.close()
-        self._process.wait()
+    )
 
 
 def profile() -> None:

@@ -41,7 +41,6 @@ from mtcsirl.settings.loading import load
 from mtcsirl.settings.runs import AgentRunSettings, IrlRunSettings, ScoreRunSettings, baseline_run
 from mtcsirl.settings.runs import irl_run as irl_settings
 from mtcsirl.study.memory import agent_memory, irl_memory, score_memory
-from mtcsirl.study.plan import load_rates
 
 AGAIN = ("resumed", "scored")
 """Parts that are processes of their own, after the others."""
@@ -243,10 +242,9 @@ def main() -> None:
 def planned(case: str) -> dict[str, float]:
     """MiB of a run, and of a score of what it leaves, as planned."""
     settings, count = settings_of(case)
-    base = load_rates().base_memory_mib
     if isinstance(settings, AgentRunSettings):
-        return {"run": agent_memory(settings, base, count)}
-    return {"run": irl_memory(settings, count, base), "scored": score_memory(settings, count, base)}
+        return {"run": agent_memory(settings, count)}
+    return {"run": irl_memory(settings, count), "scored": score_memory(settings, count)}
 
 
 if __name__ == "__main__":

@@ -35,7 +35,8 @@ from mtcsirl.settings.loading import load
 from mtcsirl.settings.machine import check_device
 from mtcsirl.settings.runs import AgentRunSettings, DemonstrationRunSettings, expert_run, irl_run
 from mtcsirl.study.design import design
-from mtcsirl.study.plan import load_rates, plan
+from mtcsirl.study.plan import plan
+from mtcsirl.study.rates import load_rates
 
 TASK = "reach-wall"
 AGENTS = (1, 16, 64, 256)

@@ -1,4 +1,4 @@
-"""SAC gradient updates per second against stock stable-baselines3, at four minibatch sizes.
+"""SAC gradient updates per second against stock stable-baselines3 and against sbx, at four minibatch sizes.
 
     python -m benchmarks.sac_updates             the table
     python -m benchmarks.sac_updates --profile   then, where the time of an update goes
@@ -6,9 +6,11 @@
 Both learners have the networks of the paper (Table 5) and sample their own replay memory of 10,000 transitions, so an
 update is what a training run pays for one. They take turns in one thread, timed in CPU seconds of that thread, so that
 whatever else the machine does slows both alike. The share of the GEMM peak is the rate at which an update does its
-multiplications, over that of one large matrix product timed in the same turns.
+multiplications, over that of one large matrix product timed in the same turns. sbx is stable-baselines3 on JAX; `sh
+benchmarks/peer_environment.sh sbx` makes its environment, and without it its rows are left out.
 """
 
+import json
 import os
 from collections.abc import Callable, Iterator
 from importlib.metadata import version
@@ -22,7 +24,7 @@ import torch
 from stable_baselines3 import SAC
 from stable_baselines3.common.logger import Logger
 
-from benchmarks.sides import Row, command, row, seconds
+from benchmarks.sides import Row, command, peer, row, seconds, served
 from mtcsirl.agents.replay import Replay
 from mtcsirl.agents.sac import FusedSac
 from mtcsirl.settings import SacSettings
@@ -32,6 +34,7 @@ TRANSITIONS = 10_000
 OBSERVATION, ACTION = 39, 4
 TURN_SECONDS = 0.25
 GEMM = 1024
+SBX = "sbx 0.28.0, JAX 0.10.2"
 
 
 class Spaces(gymnasium.Env[np.ndarray, np.ndarray]):
@@ -42,15 +45,32 @@ class Spaces(gymnasium.Env[np.ndarray, np.ndarray]):
 
 
 def measure(rounds: int = 9, minibatches: tuple[int, ...] = MINIBATCHES) -> Iterator[Row]:
-    """Rows of updates a second, one per minibatch, with ``gemm_share``."""
-    peer = f"stable-baselines3 {version('stable-baselines3')}"
+    """Rows of updates a second, one per minibatch and peer; ``gemm_share`` beside stable-baselines3."""
     for minibatch in minibatches:
-        turns = (_ours(minibatch), _theirs(minibatch), _gemm())
-        counts = [max(1, round(TURN_SECONDS / seconds(turn, 3))) for turn in turns]
-        times = np.array([[seconds(*turn) for turn in zip(turns, counts, strict=True)] for _ in range(rounds)])
-        rate, peak = update_flops(minibatch) / times[:, 0], 2 * GEMM**3 / times[:, 2]
-        found = row("sac_updates", f"minibatch {minibatch}", peer, times[:, :2])
-        yield found | {"gemm_share": float(np.median(rate / peak))}
+        yield _against_sb3(minibatch, rounds)
+    for minibatch in minibatches if peer("sbx").exists() else ():
+        settings = {"minibatch": minibatch, "hidden_sizes": [256, 256], "transitions": TRANSITIONS}
+        with served("sbx", "sbx_sac.py", json.dumps(settings)) as theirs:
+            yield _against_sbx(minibatch, theirs, rounds)
+
+
+def _against_sb3(minibatch: int, rounds: int) -> Row:
+    turns = (_ours(minibatch), _theirs(minibatch), _gemm())
+    counts = [max(1, round(TURN_SECONDS / seconds(turn, 3))) for turn in turns]
+    times = np.array([[seconds(*turn) for turn in zip(turns, counts, strict=True)] for _ in range(rounds)])
+    rate, peak = update_flops(minibatch) / times[:, 0], 2 * GEMM**3 / times[:, 2]
+    found = row(
+        "sac_updates", f"minibatch {minibatch}", f"stable-baselines3 {version('stable-baselines3')}", times[:, :2]
+    )
+    return found | {"gemm_share": float(np.median(rate / peak))}
+
+
+def _against_sbx(minibatch: int, theirs: Callable[[int], float], rounds: int) -> Row:
+    ours = _ours(minibatch)
+    theirs(3)  # JAX compiles
+    counts = [max(1, round(TURN_SECONDS / once)) for once in (seconds(ours, 3), theirs(3))]
+    times = [[seconds(ours, counts[0]), theirs(counts[1])] for _ in range(rounds)]
+    return row("sac_updates", f"minibatch {minibatch}", SBX, times)
 
 
 def update_flops(minibatch: int, hidden: tuple[int, ...] = (256, 256)) -> float:

@@ -1,7 +1,11 @@
 """What the benchmarks share: a turn in CPU seconds, a row from the turns of both sides, a command line."""
 
 import argparse
-from collections.abc import Callable, Iterable
+import json
+import subprocess
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
 from statistics import median, quantiles
 from time import thread_time
 from typing import Any
@@ -10,6 +14,7 @@ import numpy as np
 import torch
 
 Row = dict[str, Any]
+FOLDER = Path(__file__).parent
 _WIDTHS = (20, 42, 12, 12, 8, 14, 8)
 
 
@@ -21,7 +26,28 @@ def seconds(call: Callable[[], Any], count: int = 1) -> float:
     return (thread_time() - started) / count
 
 
-def row(benchmark: str, setting: str, peer: str, times: Iterable[Iterable[float]], work: float = 1.0) -> Row:
+def peer(name: str) -> Path:
+    """The interpreter of a peer's environment; it exists once peer_environment.sh has made it."""
+    return FOLDER.parent / "build" / name / "bin/python"
+
+
+@contextmanager
+def served(name: str, script: str, *arguments: str) -> Iterator[Callable[[int], float]]:
+    """A script of this folder in the environment of a peer; one call is one turn there, in CPU seconds."""
+    command = [str(peer(name)), "-W", "ignore", str(FOLDER / script), *arguments]
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.DEVNULL}
+    with subprocess.Popen(command, text=True, **pipes) as process:  # type: ignore[call-overload]
+
+        def turn(count: int = 1) -> float:
+            process.stdin.write(f"{count}\n")
+            process.stdin.flush()
+            return float(json.loads(process.stdout.readline()))
+
+        yield turn
+        process.stdin.close()
+
+
+def row(benchmark: str, setting: str, against: str, times: Iterable[Iterable[float]], work: float = 1.0) -> Row:
     """A row {benchmark, setting, ours, theirs, peer, ratio, ratio_low, ratio_high} from (ours, theirs) of every round.
 
     ours and theirs: ``work`` per second of the median turn. The ratio is the median of the rounds' ratios; ratio_low
@@ -36,7 +62,7 @@ def row(benchmark: str, setting: str, peer: str, times: Iterable[Iterable[float]
         "setting": setting,
         "ours": ours,
         "theirs": theirs,
-        "peer": peer,
+        "peer": against,
         "ratio": median(ratios),
         "ratio_low": low,
         "ratio_high": high,

@@ -4,18 +4,19 @@ import gc
 import os
 from pathlib import Path
 
+# before numpy, whose library reads them when it loads
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+os.environ.setdefault("MKL_NUM_THREADS", "1")
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 import pytest
 import torch
 
 import mtcsirl.agents.sac
-from mtcsirl.cli import THREADS
 from mtcsirl.settings import SacSettings
 from mtcsirl.settings.runs import AgentRunSettings
 from mtcsirl.worlds.drawable import lacking
 from tests.claimed_device import ClaimedGenerator, ClaimedGpu
-
-for _name in THREADS:
-    os.environ.setdefault(_name, "1")
 
 CHECKOUT = Path(__file__).resolve().parents[1]
 needs_rendering = pytest.mark.skipif(lacking() is not None, reason=str(lacking()))

@@ -1,6 +1,7 @@
 """The command line: every verb explains itself, and every mistake is one line and exit code 2."""
 
 import argparse
+import dataclasses
 import json
 import os
 import re
@@ -22,7 +23,8 @@ from mtcsirl.settings.runs import AgentRunSettings, expert_run
 from mtcsirl.study.design import design
 from mtcsirl.study.keys import identity_of
 from mtcsirl.study.outputs import OUTPUTS
-from mtcsirl.study.plan import CALIBRATION, Rates, cost, load_rates, plan, wall_hours
+from mtcsirl.study.plan import cost, plan, wall_hours
+from mtcsirl.study.rates import CALIBRATION, Rates, by_minibatch, load_rates
 from mtcsirl.study.runs import Expert
 from mtcsirl.study.status import DONE, FAILED, RUNNING, STALE, WAITING, run_status, seconds_left, study_status
 
@@ -138,41 +140,92 @@ def test_plan_counts_the_jobs_of_the_design(capsys: pytest.CaptureFixture[str]) 
     assert int(printed["total"]) == sum(expected.values())
 
 
+LONE, MANY = 1, 16
+EXPERIMENTS = ("single_target", "multi_target", "multi_task")
+
+
 @pytest.fixture
 def rates() -> Rates:
     """Round numbers, so that costs can be worked out by hand."""
+    update = {128: 0.01, 256: 0.02}
+    discriminators = {"default": {256: 0.008}, "mt_csirl": {256: 0.004}}
+    generator = {"step": 0.001, "update": update, "discriminator_update": discriminators, "density": 1e-6}
     return Rates(
         machine="made up",
         start_up=1.0,
+        frames=0.5,
         environment_step={"default": 0.001, "push-back": 0.003},
-        action=0.001,
-        sac_update={128: 0.01, 256: 0.02},
-        lockstep=1.0,
-        discriminator_update={256: 0.004},
+        episode_step=0.0005,
+        recorded=0.0001,
+        agents={
+            LONE: {"step": 0.001, "update": update},
+            MANY: {"step": 0.0004, "update": {128: 0.007, 256: 0.014}},
+        },
+        generators={LONE: generator},
+        scored=1.0,
+        resampled=1e-6,
         slowdown=1.0,
-        base_memory_mib=400,
-        agent_disk_mib=1,
-        bootstrap=0.0,
     )
 
 
-def test_cost_of_an_agent_by_hand(rates: Rates) -> None:
-    settings = Settings(
+@pytest.fixture
+def small_agents() -> Settings:
+    return Settings(
         expert={"steps": {"default": 2000}},
         sac={"minibatch": 128, "updates_per_step": 0.5, "random_steps": 1000},
         progress={"select_every": 1000, "select_episodes": 1},
         evaluation={"episodes": 1, "episode_steps": 500},
     )
-    steps, updates = 2000 + 2 * 500 + 2 * (1 + 1) * 500, (2000 - 1000) * 0.5  # trained, tried, evaluated kept and last
-    reach = cost(Expert("velocity", "reach", 0, 0), settings, rates)
-    assert reach.seconds == pytest.approx(1.0 + steps * 0.002 + updates * 0.01)
-    push = cost(Expert("velocity", "push-back", 0, 0), settings, rates)
-    assert push.seconds - reach.seconds == pytest.approx(steps * 0.002)
+
+
+def test_cost_of_an_agent_by_hand(rates: Rates, small_agents: Settings) -> None:
+    tried, updates = 2 * 500 + 2 * (1 + 1) * 500, (2000 - 1000) * 0.5  # tried, then kept and last evaluated
+    reach = cost(Expert("velocity", "reach", 0, 0), small_agents, rates)
+    assert reach.seconds == pytest.approx(1.5 + 2000 * 0.002 + tried * 0.0015 + updates * 0.01)
+    push = cost(Expert("velocity", "push-back", 0, 0), small_agents, rates)
+    assert push.seconds - reach.seconds == pytest.approx((2000 + tried) * 0.002)
+
+
+def test_among_many_an_agent_costs_what_was_measured_there(rates: Rates, small_agents: Settings) -> None:
+    run = Expert("velocity", "reach", 0, 0)
+    alone, two, many = (cost(run, small_agents, rates, count).seconds for count in (LONE, 2, MANY))
+    assert many == pytest.approx(1.5 / MANY + 2000 * 0.0014 + 3000 * 0.0015 + 500 * 0.007)
+    assert many < two < alone
 
 
 def test_updates_between_and_beyond_the_measured_minibatches(rates: Rates) -> None:
-    assert rates.update(rates.sac_update, 192) == pytest.approx(0.015)
-    assert rates.update(rates.sac_update, 512) == pytest.approx(0.04)
+    assert by_minibatch(rates.agents[LONE].update, 192) == pytest.approx(0.015)
+    assert by_minibatch(rates.agents[LONE].update, 512) == pytest.approx(0.04)
+
+
+def test_cost_of_an_irl_run_by_hand(rates: Rates) -> None:
+    """By one method of which the cost of discriminators is known, and by one of an extension."""
+    settings = Settings(
+        irl={
+            "iterations": 3,
+            "warm_up_iterations": {"default": 2},
+            "steps_per_iteration": 100,
+            "generator_replay": 2,
+            "generator_updates": dict.fromkeys(EXPERIMENTS, 10),
+            "discriminator_updates": dict.fromkeys(EXPERIMENTS, 5),
+        },
+        sac={"minibatch": 128},
+        demonstrations={"episodes": dict.fromkeys(EXPERIMENTS, 1)},
+        evaluation={"episodes": 1, "episode_steps": 200},
+    )
+    (run, *_) = design(settings, "figure_6").irl_runs
+    # the policy before the first iteration of IRL is tabulated too: 4 times the demonstrations' 200, windows of two
+    # rollouts of 100, and the older policy of the mixture in three of the newest rollouts
+    tabulated = 4 * 200 + 4 * 200 + 3 * 100
+    generator = 500 * 0.002 + 5 * 10 * 0.01 + tabulated * 1e-6 + 500 * 0.0001 + 400 * 0.0015
+    known = cost(run, settings, rates).seconds
+    assert known == pytest.approx(1.5 + generator + 3 * 5 * 0.004)
+    own = dataclasses.replace(run, method="mine")
+    assert cost(own, settings, rates).seconds - known == pytest.approx(3 * 5 * 0.004)
+    unknown = dataclasses.replace(
+        run, method="mt_airl"
+    )  # its discriminators learn in the two iterations of warm-up too
+    assert cost(unknown, settings, rates).seconds - known > 5 * 5 * 0.008 - 3 * 5 * 0.004
 
 
 def test_irl_cost_grows_linearly_with_its_members(rates: Rates) -> None:
@@ -185,7 +238,7 @@ def test_irl_cost_grows_linearly_with_its_members(rates: Rates) -> None:
             }
         )
         (run, *_) = design(own, "table_4").irl_runs
-        seconds[len(run.members)] = cost(run, own, rates).seconds - rates.start_up
+        seconds[len(run.members)] = cost(run, own, rates).seconds - rates.start_up - rates.frames
     (few, some), (many, more) = sorted(seconds.items())
     assert more / some == pytest.approx(many / few)
 
@@ -220,8 +273,9 @@ WRONG = {
     "start_up: -1": "start_up = -1: must be greater than 0",
     "start_up: NaN": "start_up = nan: must be a finite number",
     "start_up: Infinity": "start_up = inf: must be a finite number",
-    "sac_update: {}": "sac_update: must not be empty",
-    'sac_update: {"64": 0}': "sac_update.64 = 0: must be greater than 0",
+    "agents: {}": "agents: must not be empty",
+    'agents: {"1": {"step": 1, "update": {"64": 0}}}': "agents.1.update.64 = 0: must be greater than 0",
+    'agents: {"0": {"step": 1, "update": {"64": 1}}}': "agents.0",
     "slowdown: 0.5": "slowdown = 0.5: must be greater than or equal to 1",
     'environment_step: {"reach": 1}': "environment_step: must have a rate named default",
 }
@@ -244,7 +298,9 @@ def test_rates_that_cannot_be_are_refused_in_one_line(
 def test_the_shipped_rates_are_measured() -> None:
     rates = load_rates()
     assert rates.start_up > 0
-    assert rates.sac_update[500] > rates.sac_update[128]
+    lone, many = (rates.agents[count] for count in sorted(rates.agents))
+    assert lone.update[500] > lone.update[128]
+    assert many.step < lone.step
     assert rates.environment_step["push-back"] > rates.environment_step["default"]
 
 

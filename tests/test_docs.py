@@ -11,7 +11,8 @@ import pytest
 from mtcsirl.settings import Settings
 from mtcsirl.settings.loading import load
 from mtcsirl.study.design import ARTEFACTS, design
-from mtcsirl.study.plan import load_rates, plan
+from mtcsirl.study.plan import plan
+from mtcsirl.study.rates import load_rates
 from tests.conftest import CHECKOUT
 
 SOURCE = CHECKOUT / "src" / "mtcsirl"

@@ -14,7 +14,8 @@ import pytest
 from mtcsirl.settings import Settings
 from mtcsirl.settings.loading import load
 from mtcsirl.study.design import design
-from mtcsirl.study.plan import Request, load_rates, request
+from mtcsirl.study.plan import Request, request
+from mtcsirl.study.rates import load_rates
 from tests.cluster.conftest import Controller, Controllers
 from tests.cluster.slurm import Cluster, until
 

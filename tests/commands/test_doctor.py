@@ -10,7 +10,7 @@ from mtcsirl.settings import Settings
 from mtcsirl.settings.loading import load
 from mtcsirl.study import readiness
 from mtcsirl.study.design import design
-from mtcsirl.study.plan import load_rates
+from mtcsirl.study.rates import load_rates
 from mtcsirl.study.readiness import FAILS, LACKS, OK
 from mtcsirl.study.runs import AnyRun
 from tests.conftest import CHECKOUT

@@ -16,7 +16,8 @@ from mtcsirl.rewards.learned import load_learned_reward
 from mtcsirl.settings import Settings
 from mtcsirl.study.design import ARTEFACTS, design
 from mtcsirl.study.outputs import OUTPUTS
-from mtcsirl.study.plan import load_rates, request
+from mtcsirl.study.plan import request
+from mtcsirl.study.rates import load_rates
 from mtcsirl.study.runs import Baseline, Expert, IrlRun, Runs, Transfer
 from mtcsirl.study.status import DONE, study_status
 from tests.dag.conftest import SMOKE, Snakemake

@@ -2,7 +2,7 @@
 
 imitation cannot be installed beside this suite. Its numbers were recorded by
 
-    sh benchmarks/imitation_environment.sh
+    sh benchmarks/peer_environment.sh imitation
     build/imitation/bin/python benchmarks/imitation_airl.py record tests/data/imitation.json
 """
 

@@ -7,7 +7,8 @@ from mtcsirl.settings import Settings
 from mtcsirl.settings.loading import load
 from mtcsirl.study.design import design
 from mtcsirl.study.memory import irl_memory
-from mtcsirl.study.plan import cost, load_rates, request
+from mtcsirl.study.plan import cost, request
+from mtcsirl.study.rates import load_rates
 
 MEASURED = {
     "desk-irl-1": (617, 618),
@@ -35,11 +36,11 @@ def test_the_plan_is_within_15_percent_of_what_was_measured(case: str) -> None:
 def test_more_generators_longer_memories_and_larger_networks_take_more() -> None:
     run = next(one for one in design(Settings()).irl_runs if len(one.members) == 6)
     own = run.settings(Settings())
-    least = irl_memory(own, 6, 400)
-    assert irl_memory(own, 7, 400) > least
+    least = irl_memory(own, 6)
+    assert irl_memory(own, 7) > least
     for part in ({"sac": {"hidden_sizes": [512, 512]}}, {"sac": {"critics": 5}}):
         larger = Settings.model_validate(part)
-        assert irl_memory(run.settings(larger), 6, 400) > least, part
+        assert irl_memory(run.settings(larger), 6) > least, part
 
 
 def test_a_run_asks_for_more_than_it_needs_and_for_more_on_a_retry() -> None:

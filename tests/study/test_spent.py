@@ -8,7 +8,8 @@ from mtcsirl import cli
 from mtcsirl.files import storage
 from mtcsirl.settings import Settings
 from mtcsirl.study.design import design
-from mtcsirl.study.plan import cost, load_rates
+from mtcsirl.study.plan import cost
+from mtcsirl.study.rates import load_rates
 from mtcsirl.study.spent import ALONE, LOCKSTEP, spent
 from tests.study.made_up import finish
 
@@ -18,7 +19,8 @@ RATES = load_rates()
 def took(run, settings: Settings, share: float, lockstep: list[str]) -> None:
     """A run that is done and took ``share`` of what the plan says."""
     finish(run, settings)
-    seconds = share * (cost(run, settings, RATES).seconds - RATES.start_up)
+    together = len(lockstep) or 1
+    seconds = share * (cost(run, settings, RATES, together).seconds - RATES.start_up / together)
     provenance = {"cost": {"cpu_seconds": seconds}, "lockstep": lockstep, "machine": {"processor": "made up"}}
     storage.write_json(Path(settings.results) / run.folder / "provenance.json", provenance)
 
@@ -36,6 +38,13 @@ def test_by_stage_and_by_the_way_they_were_made(settings: Settings) -> None:
     assert lockstep.ratio == lockstep.low == lockstep.high == pytest.approx(0.2)
 
 
+def test_where_cores_are_busy_the_plan_says_more(settings: Settings) -> None:
+    took(design(settings).baselines[0], settings, 1.0, [])
+    busy = RATES.model_copy(update={"slowdown": 1.25})
+    ratios = [spent(design(settings), settings, busy, cores)[0].ratio for cores in (1, 2)]
+    assert ratios == pytest.approx([1.0, 0.8])
+
+
 def test_what_is_stale_or_absent_says_nothing(settings: Settings) -> None:
     study = design(settings)
     took(study.baselines[0], settings, 0.5, [])
@@ -49,7 +58,7 @@ def test_the_verb_prints_it_and_refuses_a_study_without_runs(
     took(design(settings).baselines[0], settings, 0.5, [])
     file = tmp_path / "settings.json"
     file.write_text(settings.model_dump_json(), encoding="utf-8")
-    assert cli.main(["plan", "--against-runs", "--settings", str(file)]) == 0
+    assert cli.main(["plan", "--against-runs", "--cores", "1", "--settings", str(file)]) == 0
     said = capsys.readouterr().out
     assert " 0.50 " in said
     assert RATES.machine in said

@@ -25,7 +25,8 @@ from mtcsirl.study.ablations import ABLATIONS
 from mtcsirl.study.artefacts import HEAT_MAPS, settle_artefacts
 from mtcsirl.study.design import ARTEFACTS, CLAIMS, design
 from mtcsirl.study.keys import FIELDS
-from mtcsirl.study.plan import load_rates, plan, request
+from mtcsirl.study.plan import plan, request
+from mtcsirl.study.rates import load_rates
 from mtcsirl.study.runs import Baseline, Demonstrations, Expert, IrlRun, Score, Transfer
 from mtcsirl.study.screen import EXPECTED
 from mtcsirl.study.standing import settle

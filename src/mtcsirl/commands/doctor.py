@@ -23,7 +23,7 @@ def register(verbs: Verbs) -> None:
 
 
 def _doctor(parsed: argparse.Namespace) -> None:
-    from mtcsirl.study.plan import load_rates
+    from mtcsirl.study.rates import load_rates
     from mtcsirl.study.readiness import FAILS, findings
     from mtcsirl.study.screen import wrapped
 

@@ -75,7 +75,7 @@ def _watch(parsed: argparse.Namespace, settings: "Settings") -> None:
 
 
 def _left(statuses: "list[RunStatus]", settings: "Settings", cores: int) -> str:
-    from mtcsirl.study.plan import load_rates
+    from mtcsirl.study.rates import load_rates
     from mtcsirl.study.screen import duration
     from mtcsirl.study.status import seconds_left
 

@@ -24,7 +24,7 @@ from mtcsirl.study.design import ARTEFACTS, design
 
 if TYPE_CHECKING:
     from mtcsirl.settings import Settings
-    from mtcsirl.study.plan import Rates
+    from mtcsirl.study.rates import Rates
 
 
 def register(verbs: Verbs) -> None:
@@ -39,7 +39,7 @@ def register(verbs: Verbs) -> None:
     )
     add_artefact(plan)
     plan.add_argument("--rates", type=path, default=None, metavar="FILE", help="what calibrate wrote; default: shipped")
-    plan.add_argument("--cores", type=positive, default=2, metavar="N", help="cores to spread the jobs over; default 2")
+    plan.add_argument("--cores", type=positive, default=2, metavar="N", help="cores that the jobs run on; default 2")
     plan.add_argument("--against-runs", action="store_true", help="hold it against the runs that are done, by stage")
     add_study_settings(plan)
 
@@ -92,7 +92,7 @@ def register(verbs: Verbs) -> None:
         verbs,
         "calibrate",
         _calibrate,
-        does="measure this machine's rates, about two minutes",
+        does="measure this machine's rates, about five minutes",
         needs="a machine that has nothing else to do",
         writes="the file that plan reads, --output",
     )
@@ -101,11 +101,12 @@ def register(verbs: Verbs) -> None:
 
 def _plan(parsed: argparse.Namespace) -> None:
     from mtcsirl.settings.template import fallbacks
-    from mtcsirl.study.plan import CALIBRATION, load_rates, plan, wall_hours
+    from mtcsirl.study.plan import plan, wall_hours
+    from mtcsirl.study.rates import CALIBRATION, load_rates
 
     settings, rates = study_settings(parsed), load_rates(parsed.rates or CALIBRATION)
     if parsed.against_runs:
-        _print_spent(settings, parsed.target, rates)
+        _print_spent(settings, parsed.target, rates, parsed.cores)
         return
     stages = plan(design(settings, parsed.target), settings, rates)
     lines = [
@@ -123,19 +124,19 @@ def _plan(parsed: argparse.Namespace) -> None:
         _print_artefacts(settings, rates)
 
 
-def _print_spent(settings: "Settings", target: str | None, rates: "Rates") -> None:
+def _print_spent(settings: "Settings", target: str | None, rates: "Rates", cores: int) -> None:
     """CPU seconds of done runs against those of the plan; its rates are of one machine, named below."""
     from mtcsirl.study.spent import spent
 
     lines = []
-    for s in spent(design(settings, target), settings, rates):
+    for s in spent(design(settings, target), settings, rates, cores):
         ratios = f"{s.ratio:.2f}", f"{s.low:.2f} to {s.high:.2f}"
         lines.append((s.stage, s.made, s.runs, f"{s.planned:.1f}", f"{s.measured:.1f}", *ratios, s.processor))
     if not lines:
         raise UserError(f"{settings.results}: no run is done to hold the plan against; see mtcsirl status")
     head = ("stage", "made", "runs", "planned, s", "measured, s", "ratio", "5 % to 95 %", "processor")
     _print_table(head, lines)
-    print(f"\nCPU seconds of a run without start-up; planned by the rates of: {rates.machine}")
+    print(f"\nCPU seconds of a run without start-up, {cores} at once; planned by the rates of: {rates.machine}")
 
 
 def _print_artefacts(settings: "Settings", rates: "Rates") -> None:
@@ -211,7 +212,7 @@ def _settings(parsed: argparse.Namespace) -> None:
 
 def rates_to_write(given: str) -> Path:
     """A file for rates: a new one, or one that holds rates already."""
-    from mtcsirl.study.plan import load_rates
+    from mtcsirl.study.rates import load_rates
 
     file = new_file(given)
     if file.exists():
@@ -223,8 +224,8 @@ def rates_to_write(given: str) -> Path:
 
 
 def _calibrate(parsed: argparse.Namespace) -> None:
+    from mtcsirl.calibration.measure import calibrate
     from mtcsirl.files.storage import write_json
-    from mtcsirl.study.calibration import calibrate
 
     rates = calibrate()
     write_json(parsed.output, rates.model_dump(mode="json"))

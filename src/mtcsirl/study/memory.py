@@ -1,7 +1,7 @@
 """Memory that a job holds at most, in MiB: what the plan prints and the workflow asks for.
 
 Measured with everything full, a checkpoint written and taken up, and the results written (``python -m
-benchmarks.memory``, docs/performance.md). It is the same on every machine, so it is no part of a calibration.
+benchmarks.memory``, docs/performance.md). It is the same on every machine, so it is no part of its rates.
 """
 
 from __future__ import annotations
@@ -13,6 +13,8 @@ from mtcsirl.settings.runs import AgentRunSettings, IrlRunSettings
 
 BYTES_PER_TRANSITION = 4 * (39 + 4 + 39 + 1)
 MIB = 2**20
+BASE = 420.0
+"""Of a job with one environment, before it holds anything."""
 AGENT, GENERATOR = 22.0, 44.0
 """An environment, streams of random numbers and layers' outputs; of a generator also what discriminators see of it."""
 FRAMES = 85.0
@@ -27,17 +29,17 @@ SAMPLED_ROLLOUTS = 10
 """Last rollouts of a generator that an IRL run leaves, and that a score reads."""
 
 
-def agent_memory(own: AgentRunSettings, base: float, agents: int = 1) -> float:
+def agent_memory(own: AgentRunSettings, agents: int = 1) -> float:
     """``agents`` that train in lockstep. At most when a checkpoint is taken up: the replay memory is there twice."""
-    return base + agents * (AGENT + _networks(own.sac) + 2 * _transitions(own.steps))
+    return BASE + agents * (AGENT + _networks(own.sac) + 2 * _transitions(own.steps))
 
 
-def demonstrations_memory(steps: int, base: float) -> float:
+def demonstrations_memory(steps: int) -> float:
     """``steps`` transitions recorded step by step and written as a frame."""
-    return base + FRAMES + RECORDED * _transitions(steps)
+    return BASE + FRAMES + RECORDED * _transitions(steps)
 
 
-def irl_memory(own: IrlRunSettings, generators: int, base: float) -> float:
+def irl_memory(own: IrlRunSettings, generators: int) -> float:
     """An IRL run: at most when a checkpoint is taken up, or when the samples that it leaves are written."""
     irl = own.irl
     steps = (irl.warm_up_iterations + irl.iterations) * irl.steps_per_iteration
@@ -45,12 +47,12 @@ def irl_memory(own: IrlRunSettings, generators: int, base: float) -> float:
     seen = _transitions(min(irl.generator_replay * irl.steps_per_iteration, irl.generator_memory))
     shown = READ * _transitions(own.demonstration_episodes * own.evaluation.episode_steps)
     written = IN_A_FRAME * sampled(own)
-    return base + FRAMES + generators * (GENERATOR + _networks(own.sac) + held + seen + shown + max(held, written))
+    return BASE + FRAMES + generators * (GENERATOR + _networks(own.sac) + held + seen + shown + max(held, written))
 
 
-def score_memory(own: IrlRunSettings, generators: int, base: float) -> float:
+def score_memory(own: IrlRunSettings, generators: int) -> float:
     """A score reads the samples of the IRL run ``own``."""
-    return base + SCORING + generators * SCORED * sampled(own)
+    return BASE + SCORING + generators * SCORED * sampled(own)
 
 
 def sampled(own: IrlRunSettings) -> float:

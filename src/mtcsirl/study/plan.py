@@ -1,89 +1,40 @@
 """What a study costs before it runs: jobs, core-hours, wall time, memory and disk, from measured rates.
 
-``study/calibration.json`` holds the rates of one machine; ``mtcsirl calibrate`` measures another one. The model is the
-sum of what a job does: start-up, environment steps, gradient steps, trial and final episodes. A test holds its parts
-against each other; the start page of a finished study gives the cost as measured.
+The model is the sum of what a job does: start-up, environment steps, gradient steps, trial and final episodes, each
+times its rate (:mod:`mtcsirl.study.rates`). ``mtcsirl plan --against-runs`` holds it against the runs that are done.
 """
 
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import singledispatch
 from math import ceil
-from pathlib import Path
-from typing import Annotated
 
-import numpy as np
-from pydantic import Field, field_validator
-
-from mtcsirl.errors import UserError
-from mtcsirl.files.storage import read_json
 from mtcsirl.settings import EvaluationSettings, SacSettings, Settings
-from mtcsirl.settings.base import Frozen
-from mtcsirl.settings.loading import validate
 from mtcsirl.settings.runs import AgentRunSettings, IrlRunSettings
+from mtcsirl.settings.unread import METHODS
 from mtcsirl.study.memory import (
     BYTES_PER_TRANSITION,
+    SAMPLED_ROLLOUTS,
     agent_memory,
     demonstrations_memory,
     irl_memory,
     score_memory,
     weights,
 )
+from mtcsirl.study.rates import DEFAULT, AgentRates, GeneratorRates, Rates, by_minibatch, share
 from mtcsirl.study.runs import AnyRun, Baseline, Demonstrations, Expert, IrlRun, Score, Transfer
 
-CALIBRATION = Path(__file__).with_name("calibration.json")
 MEASURED_HIDDEN = {"sac": (256, 256), "f": (128, 128)}
 """Hidden layers of the networks whose updates were measured."""
 INPUTS = 82
 """(s, a, s') of a learned reward."""
-SCORE_SETS = 5
-"""Transition sets of score_reward that are rolled out."""
+ACTED, SCORED = 3, 5
+"""Transition sets of a score: those that policies act for, and all."""
+AGENT_DISK_MIB = 0.6
 MEMORY_MARGIN = 1.25
 OTHER_MACHINES = 2.0
 """How much slower than the calibrated one a machine may be for a run to end in its time."""
 LEAST_MINUTES = 10
-
-
-Seconds = Annotated[float, Field(gt=0)]
-"""No rate is zero, negative or infinite: whoever measured one has measured something else."""
-ByMinibatch = Annotated[dict[Annotated[int, Field(gt=0)], Seconds], Field(min_length=1)]
-
-
-class Rates(Frozen):
-    """Measured on one idle core; seconds unless the name says otherwise. Minibatches are keys of ``*_update``."""
-
-    machine: Annotated[str, Field(min_length=1)]
-    start_up: Seconds
-    environment_step: dict[str, Seconds]
-    action: Seconds
-    sac_update: ByMinibatch
-    lockstep: Annotated[float, Field(gt=0)]
-    """What an agent's gradient step costs among those of several generators, as a share of a lone one's."""
-    discriminator_update: ByMinibatch
-    slowdown: Annotated[float, Field(ge=1)]
-    """Factor on everything when every core is busy."""
-    base_memory_mib: Annotated[float, Field(gt=0)]
-    """Of a job with one environment, before it holds anything."""
-    agent_disk_mib: Annotated[float, Field(gt=0)]
-    bootstrap: Annotated[float, Field(ge=0)]
-
-    @field_validator("environment_step")
-    @classmethod
-    def _has_a_default(cls, steps: dict[str, float]) -> dict[str, float]:
-        if "default" not in steps:
-            raise ValueError("must have a rate named default, for tasks that were not measured")
-        return steps
-
-    def step(self, task: str) -> float:
-        """One environment step of ``task`` with the action for it."""
-        return self.environment_step.get(task, self.environment_step["default"]) + self.action
-
-    def update(self, rates: dict[int, float], minibatch: int) -> float:
-        """Seconds per gradient step at ``minibatch``: linear between, and proportional beyond, the measured ones."""
-        sizes = sorted(rates)
-        if minibatch > sizes[-1]:
-            return rates[sizes[-1]] * minibatch / sizes[-1]
-        return float(np.interp(minibatch, sizes, [rates[size] for size in sizes]))
 
 
 @dataclass(frozen=True)
@@ -95,86 +46,117 @@ class Cost:
     disk_mib: float
 
 
-def load_rates(path: Path | str = CALIBRATION) -> Rates:
-    """The rates in a calibration file.
-
-    Raises:
-        UserError: the file is missing, empty or no JSON, or a rate is missing or cannot be.
-    """
-    said = read_json(path)
-    if not isinstance(said, dict):
-        raise UserError(f"{path}: holds no rates; write it by mtcsirl calibrate --output {path}")
-    if missing := [name for name in Rates.model_fields if name not in said]:
-        raise UserError(f"{path}: lacks {', '.join(missing)}; measure again by mtcsirl calibrate --output {path}")
-    try:
-        return validate(Rates, said)
-    except UserError as error:
-        reason = str(error).removeprefix("configuration: ")
-        raise UserError(f"{path}: {reason}; measure again by mtcsirl calibrate --output {path}") from error
-
-
 @singledispatch
-def cost(run: AnyRun, settings: Settings, rates: Rates) -> Cost:
-    """What one run takes."""
+def cost(run: AnyRun, settings: Settings, rates: Rates, together: int = 1) -> Cost:
+    """What one run takes; ``together``: how many agents train in lockstep, of which this is one."""
     raise TypeError(f"no cost model for {run.stage}")
 
 
 @cost.register(Expert)
 @cost.register(Baseline)
-def _of_selected(run: Expert | Baseline, settings: Settings, rates: Rates) -> Cost:
+def _of_selected(run: Expert | Baseline, settings: Settings, rates: Rates, together: int = 1) -> Cost:
     """These try their policies, and evaluate the one that they keep beside the last."""
     own = run.settings(settings)
     tries = own.progress.select_episodes * (own.steps // own.progress.select_every)
-    return _agent(own, run.task, rates, tries * own.evaluation.episode_steps + 2 * _evaluation_steps(own.evaluation))
+    tried = tries * own.evaluation.episode_steps + 2 * _evaluation_steps(own.evaluation)
+    return _agent(own, run.task, rates, tried, together)
 
 
 @cost.register
-def _of_transfer(run: Transfer, settings: Settings, rates: Rates) -> Cost:
+def _of_transfer(run: Transfer, settings: Settings, rates: Rates, together: int = 1) -> Cost:
     own = run.settings(settings)
-    return _agent(own, run.task, rates, _evaluation_steps(own.evaluation))
+    return _agent(own, run.task, rates, _evaluation_steps(own.evaluation), together)
 
 
 @cost.register
-def _of_demonstrations(run: Demonstrations, settings: Settings, rates: Rates) -> Cost:
+def _of_demonstrations(run: Demonstrations, settings: Settings, rates: Rates, together: int = 1) -> Cost:
     own = run.settings(settings)
     steps = own.episodes * own.episode_steps
-    memory = demonstrations_memory(steps, rates.base_memory_mib)
-    return Cost(rates.start_up + steps * rates.step(run.task), memory, steps * BYTES_PER_TRANSITION / 2**20)
+    seconds = rates.start_up + rates.frames + steps * (_episode_step(run.task, rates) + rates.recorded)
+    return Cost(seconds, demonstrations_memory(steps), steps * BYTES_PER_TRANSITION / 2**20)
 
 
 @cost.register
-def _of_irl(run: IrlRun, settings: Settings, rates: Rates) -> Cost:
-    return _irl(run.settings(settings), [task for task, _ in run.members], rates)
-
-
-@cost.register
-def _of_score(run: Score, settings: Settings, rates: Rates) -> Cost:
-    score = run.settings(settings).score
-    seconds = rates.start_up + SCORE_SETS * score.transitions * rates.step(run.task)
-    memory = score_memory(run.irl.settings(settings), len(run.irl.members), rates.base_memory_mib)
-    return Cost(seconds + score.bootstrap * rates.bootstrap, memory, 1.0)
-
-
-def _agent(own: AgentRunSettings, task: str, rates: Rates, tried: int) -> Cost:
-    """``tried``: environment steps beside training."""
-    updates = max((own.steps - own.sac.random_steps) * own.sac.updates_per_step, 0)
-    seconds = (own.steps + tried) * rates.step(task) + updates * _sac_update(own.sac, rates)
-    return Cost(rates.start_up + seconds, agent_memory(own, rates.base_memory_mib), rates.agent_disk_mib)
-
-
-def _irl(own: IrlRunSettings, tasks: list[str], rates: Rates) -> Cost:
+def _of_irl(run: IrlRun, settings: Settings, rates: Rates, together: int = 1) -> Cost:
+    own, generators = run.settings(settings), len(run.members)
     irl = own.irl
     rounds = irl.warm_up_iterations + irl.iterations
-    update = irl.generator_updates * _sac_update(own.sac, rates) * (rates.lockstep if len(tasks) > 1 else 1.0)
-    step = rates.update(rates.discriminator_update, irl.discriminator.minibatch)
-    size = weights(INPUTS, irl.discriminator.hidden_sizes, 1) / weights(INPUTS, MEASURED_HIDDEN["f"], 1)
-    discriminate = irl.discriminator_updates * step * size
-    seconds = rates.start_up + len(tasks) * (rounds * update + irl.iterations * discriminate)
-    steps = rounds * irl.steps_per_iteration
-    seconds += sum((steps + _evaluation_steps(own.evaluation)) * rates.step(task) for task in tasks)
-    memory = irl_memory(own, len(tasks), rates.base_memory_mib)
+    seconds = rates.start_up + rates.frames + generators * _of_a_generator(own, run.method, generators, rates)
+    evaluated = _evaluation_steps(own.evaluation)
+    for task, _ in run.members:
+        seconds += rounds * irl.steps_per_iteration * rates.simulated(task) + evaluated * _episode_step(task, rates)
     kept = min(irl.generator_replay, rounds) * irl.steps_per_iteration
-    return Cost(seconds, memory, len(tasks) * (rates.agent_disk_mib + kept * BYTES_PER_TRANSITION / 2**20))
+    disk = generators * (AGENT_DISK_MIB + kept * BYTES_PER_TRANSITION / 2**20)
+    return Cost(seconds, irl_memory(own, generators), disk)
+
+
+@cost.register
+def _of_score(run: Score, settings: Settings, rates: Rates, together: int = 1) -> Cost:
+    score = run.settings(settings).score
+    seconds = rates.start_up + rates.frames + ACTED * score.transitions * _episode_step(run.task, rates)
+    seconds += SCORED * (rates.scored + score.bootstrap * score.transitions * rates.resampled)
+    return Cost(seconds, score_memory(run.irl.settings(settings), len(run.irl.members)), 1.0)
+
+
+def _agent(own: AgentRunSettings, task: str, rates: Rates, tried: int, together: int) -> Cost:
+    """``tried``: environment steps beside training."""
+    updates = max((own.steps - own.sac.random_steps) * own.sac.updates_per_step, 0)
+    step = share(rates.agents, together, lambda loop: loop.step)
+    update = _update(rates.agents, together, own.sac)
+    seconds = own.steps * (rates.simulated(task) + step) + updates * update + tried * _episode_step(task, rates)
+    # what a process does once is done once for all that train in it
+    once = (rates.start_up + rates.frames) / together
+    return Cost(once + seconds, agent_memory(own), AGENT_DISK_MIB)
+
+
+def _of_a_generator(own: IrlRunSettings, method: str, generators: int, rates: Rates) -> float:
+    """Seconds of one of so many generators, without start-up and simulation."""
+    irl = own.irl
+    rounds, taught = irl.warm_up_iterations + irl.iterations, discriminating_iterations(own, method)
+    step = share(rates.generators, generators, lambda loop: loop.step)
+    seconds = rounds * irl.steps_per_iteration * step
+    seconds += rounds * irl.generator_updates * _update(rates.generators, generators, own.sac)
+    seconds += taught * irl.discriminator_updates * _discriminator_update(own, method, generators, rates)
+    seconds += tabulated(own, taught) * share(rates.generators, generators, lambda loop: loop.density)
+    return seconds + min(SAMPLED_ROLLOUTS, rounds) * irl.steps_per_iteration * rates.recorded
+
+
+def discriminating_iterations(own: IrlRunSettings, method: str) -> int:
+    """Iterations in which discriminators learn: a method that knows no task reward has no warm-up."""
+    knows = "irl.task_reward_scale" not in METHODS.get(method, ())
+    return own.irl.iterations + (0 if knows else own.irl.warm_up_iterations)
+
+
+def tabulated(own: IrlRunSettings, taught: int) -> int:
+    """Transitions, times policies, of which an IRL run tabulates log pi for each generator (irl/densities.py).
+
+    In each iteration the newest policy's of the demonstrations and of the window, and that of the others of the mixture
+    in the newest rollout.
+    """
+    irl = own.irl
+    rounds = irl.warm_up_iterations + irl.iterations
+    policies = irl.generator_replay if irl.logit_density == "mixture" else 1
+    iterations = min(rounds, taught + policies - 1)
+    shown = own.demonstration_episodes * own.evaluation.episode_steps
+    windows = sum(min(end, irl.generator_replay) for end in range(rounds - iterations + 1, rounds + 1))
+    others = sum(min(end, policies) - 1 for end in range(1, iterations + 1))
+    return iterations * shown + (windows + others) * irl.steps_per_iteration
+
+
+def _discriminator_update(own: IrlRunSettings, method: str, generators: int, rates: Rates) -> float:
+    discriminator = own.irl.discriminator
+    size = weights(INPUTS, discriminator.hidden_sizes, 1) / weights(INPUTS, MEASURED_HIDDEN["f"], 1)
+
+    def measured(loop: GeneratorRates) -> float:
+        by_method = loop.discriminator_update
+        return by_minibatch(by_method.get(method, by_method[DEFAULT]), discriminator.minibatch)
+
+    return size * share(rates.generators, generators, measured)
+
+
+def _episode_step(task: str, rates: Rates) -> float:
+    """One step of an episode outside of training."""
+    return rates.simulated(task) + rates.episode_step
 
 
 def _evaluation_steps(evaluation: EvaluationSettings) -> int:
@@ -182,7 +164,7 @@ def _evaluation_steps(evaluation: EvaluationSettings) -> int:
     return (evaluation.episodes + 1) * evaluation.episode_steps
 
 
-def _sac_update(sac: SacSettings, rates: Rates) -> float:
+def _update(loops: dict[int, AgentRates] | dict[int, GeneratorRates], together: int, sac: SacSettings) -> float:
     """Seconds of one gradient step: the measured ones were with ``MEASURED_HIDDEN`` and two critics.
 
     With A and C weights of actor and critic an update multiplies 4 A + 6 n C of them per transition for n critics:
@@ -193,7 +175,7 @@ def _sac_update(sac: SacSettings, rates: Rates) -> float:
         return 4 * weights(39, hidden, 8) + 6 * critics * weights(43, hidden, 1)
 
     size = products(sac.hidden_sizes, sac.critics) / products(MEASURED_HIDDEN["sac"], 2)
-    return rates.update(rates.sac_update, sac.minibatch) * size
+    return size * share(loops, together, lambda loop: by_minibatch(loop.update, sac.minibatch))
 
 
 @dataclass(frozen=True)

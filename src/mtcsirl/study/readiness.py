@@ -17,7 +17,9 @@ from mtcsirl.files.provenance import commit
 from mtcsirl.files.storage import check_writable
 from mtcsirl.settings import Settings
 from mtcsirl.settings.machine import check_study
-from mtcsirl.study.plan import Rates, plan
+from mtcsirl.study.memory import BASE
+from mtcsirl.study.plan import plan
+from mtcsirl.study.rates import Rates
 from mtcsirl.study.runs import AnyRun, Runs
 from mtcsirl.worlds.drawable import lacking
 
@@ -62,7 +64,7 @@ def python(version: tuple[int, ...]) -> Finding:
 
 def memory(left: list[AnyRun], settings: Settings, rates: Rates, cores: int, free_mib: float) -> Finding:
     """The memory that is free against the largest jobs of the plan, ``cores`` at once."""
-    largest = max((stage.memory_mib for stage in plan(left, settings, rates)), default=rates.base_memory_mib)
+    largest = max((stage.memory_mib for stage in plan(left, settings, rates)), default=BASE)
     said = f"{free_mib:,.0f} MiB free; a job takes up to {largest:,.0f}, {cores} at once {cores * largest:,.0f}"
     try:
         check_study(settings)

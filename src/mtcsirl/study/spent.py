@@ -8,7 +8,8 @@ from typing import NamedTuple
 
 from mtcsirl.files import storage
 from mtcsirl.settings import Settings
-from mtcsirl.study.plan import Rates, cost
+from mtcsirl.study.plan import cost
+from mtcsirl.study.rates import Rates
 from mtcsirl.study.runs import AnyRun
 from mtcsirl.study.standing import DONE, standing
 
@@ -34,19 +35,23 @@ class Spent(NamedTuple):
         return self.measured / self.planned
 
 
-def spent(study: Iterable[AnyRun], settings: Settings, rates: Rates) -> list[Spent]:
+def spent(study: Iterable[AnyRun], settings: Settings, rates: Rates, cores: int = 1) -> list[Spent]:
     """One line per stage, way and processor, of the runs that are done, in the DAG's order.
+
+    ``cores``: how many of them ran at once; where it was more than one, the plan's seconds are those of busy cores.
 
     Raises:
         UserError: the provenance of a run is unreadable.
     """
+    slowdown = rates.slowdown if cores > 1 else 1.0
     pairs: dict[tuple[str, str, str], list[tuple[float, float]]] = defaultdict(list)
     for run in study:
         if standing(run, settings).state != DONE:
             continue
         said = storage.read_json(Path(settings.results) / run.folder / "provenance.json")
+        together = len(said["lockstep"]) or 1
         made = LOCKSTEP if said["lockstep"] else ALONE
-        planned = cost(run, settings, rates).seconds - rates.start_up
+        planned = slowdown * (cost(run, settings, rates, together).seconds - rates.start_up / together)
         pairs[run.stage, made, said["machine"]["processor"]].append((planned, said["cost"]["cpu_seconds"]))
     return [_of(*key, own) for key, own in pairs.items()]
 

@@ -10,7 +10,8 @@ from mtcsirl.files import storage
 from mtcsirl.settings import Settings
 from mtcsirl.study.keys import identity_of
 from mtcsirl.study.outputs import OUTPUTS
-from mtcsirl.study.plan import Rates, cost
+from mtcsirl.study.plan import cost
+from mtcsirl.study.rates import Rates
 from mtcsirl.study.runs import AnyRun, Runs
 from mtcsirl.study.screen import last_said, short
 from mtcsirl.study.standing import DONE, INCOMPLETE, STALE, standing

@@ -1,0 +1,1 @@
+"""Measures what this machine trains in a second, for the plan and for the benchmarks."""
