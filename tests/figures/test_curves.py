@@ -81,8 +81,15 @@ def test_target_stands_in_the_title_and_on_no_curve():
     axes = new_figure(2, 2).subplots()
     draw_curves(axes, [series({("a", 0): [0.1, 0.8]}, [])], "velocity", 0.8)
     assert [text.get_text() for text in axes.texts] == []
-    assert curve_title("velocity", 0.8) == "Velocity, target 0.8"
-    assert curve_title("action_norm", None) == "Action norm"
+    assert curve_title("velocity", 0.8, []) == "Velocity, target 0.8"
+    assert curve_title("action_norm", None, []) == "Action norm"
+
+
+def test_the_title_says_how_many_seeds():
+    one, two = series({("a", 0): [1.0]}, []), series({("a", 0): [1.0], ("b", 0): [1.0], ("a", 1): [1.0]}, [])
+    assert curve_title("velocity", 0.8, [two, two]) == "Velocity, target 0.8, n = 2"
+    assert curve_title("velocity", None, [one, two]) == "Velocity, n = 1 to 2"
+    assert curve_title("velocity", None, [two, series({}, [("a", 0)])]) == "Velocity, n = 2", "nothing is no mean"
 
 
 def test_counts_differ_by_method():

@@ -133,10 +133,18 @@ def tasks_note(series: Sequence[Series]) -> list[str]:
     return [f"mean over the tasks that are there – {'; '.join(parts)}"] if parts else []
 
 
-def curve_title(metric: str, target: float | None) -> str:
-    """As in "Velocity, target 0.8": a label at the line would cover the curves that reach it."""
-    name = quantity(metric).capitalize()
-    return name if target is None else f"{name}, target {target:g}"
+def curve_title(metric: str, target: float | None, series: Sequence[Series]) -> str:
+    """As in "Velocity, target 0.8, n = 5": a label at the line would cover the curves that reach it.
+
+    n: seeds of a series, the fewest and the most where they differ; a series that is not there has none.
+    """
+    said = [quantity(metric).capitalize()]
+    if target is not None:
+        said.append(f"target {target:g}")
+    numbers = sorted({one.rows["seed"].nunique() for one in series} - {0})
+    if numbers:
+        said.append(f"n = {numbers[0]}" if len(numbers) == 1 else f"n = {numbers[0]} to {numbers[-1]}")
+    return ", ".join(said)
 
 
 def _pairs(missing: Sequence[tuple[str, int]]) -> str:

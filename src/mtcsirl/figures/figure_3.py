@@ -31,7 +31,7 @@ def draw(data: FigureData) -> Figure:
     for index, metric in enumerate(metrics):
         series = multi_task.curve_series(data, metric)
         draw_curves(axes[index], series, metric, target_of(metric))
-        panel_title(axes[index], index, curve_title(metric, target_of(metric)))
+        panel_title(axes[index], index, curve_title(metric, target_of(metric), series))
         notes += [f"({chr(ord('a') + index)}) {note}" for note in missing_note(series) + tasks_note(series)]
     panel_title(axes[-1], len(metrics), "Rewards' correlation")
     draw_scatter(axes[-1], multi_task.correlation(data, _SCATTER), multi_task.METHOD, _SCATTER)

@@ -78,7 +78,7 @@ def draw(data: FigureData, artefact: str, task: str, metrics: list[str], *, scat
         series = curve_series(data, artefact, task, metric)
         draw_curves(axes[index], series, metric, target_of(metric))
         _mark_warm_up(axes[index], warm_up_steps(data, task))
-        panel_title(axes[index], index, curve_title(metric, target_of(metric)))
+        panel_title(axes[index], index, curve_title(metric, target_of(metric), series))
         notes += [f"({chr(ord('a') + index)}) {note}" for note in missing_note(series)]
     if scatter:
         panel_title(axes[-1], panels - 1, "Rewards' correlation")

@@ -28,8 +28,8 @@ MEASURED_HIDDEN = {"sac": (256, 256), "f": (128, 128)}
 """Hidden layers of the networks whose updates were measured."""
 INPUTS = 82
 """(s, a, s') of a learned reward."""
-ACTED, SCORED = 3, 5
-"""Transition sets of a score: those that policies act for, and all."""
+EPISODE_STEPS = 500
+"""Of Meta-World's episodes, in which policies act for a score."""
 AGENT_DISK_MIB = 0.6
 MEMORY_MARGIN = 1.25
 OTHER_MACHINES = 2.0
@@ -93,9 +93,23 @@ def _of_irl(run: IrlRun, settings: Settings, rates: Rates, together: int = 1) ->
 @cost.register
 def _of_score(run: Score, settings: Settings, rates: Rates, together: int = 1) -> Cost:
     score = run.settings(settings).score
-    seconds = rates.start_up + rates.frames + ACTED * score.transitions * _episode_step(run.task, rates)
-    seconds += SCORED * (rates.scored + score.bootstrap * score.transitions * rates.resampled)
+    acted, sizes = scored_sizes(run, score.transitions)
+    seconds = rates.start_up + rates.frames + acted * _episode_step(run.task, rates)
+    seconds += len(sizes) * rates.scored + score.bootstrap * sum(sizes) * rates.resampled
     return Cost(seconds, score_memory(run.irl.settings(settings), len(run.irl.members)), 1.0)
+
+
+def scored_sizes(run: Score, wanted: int) -> tuple[int, list[int]]:
+    """Transitions that policies act for, and those of each transition set (results/scoring.py).
+
+    Whole episodes, as many of each policy of a set: the experts, the baselines, and the one of random actions. Then the
+    generators' last ones, and equal parts of these four.
+    """
+    steps = min(EPISODE_STEPS, wanted)
+    own = [
+        steps * policies * ceil(wanted / (steps * policies)) for policies in (len(run.experts), len(run.baselines), 1)
+    ]
+    return sum(own), [*own, wanted, 4 * min(*own, wanted)]
 
 
 def _agent(own: AgentRunSettings, task: str, rates: Rates, tried: int, together: int) -> Cost:
