@@ -1,5 +1,6 @@
 """What runs again after a change, and what does not. Dry runs on the finished smoke study."""
 
+import base64
 import os
 import re
 import shutil
@@ -66,7 +67,7 @@ NEUTRAL = {
     "a reformatted line": ("rewards/curriculum.py", r"R_MAX = 10\.0", "R_MAX = (\n    10.0\n)"),
     "an error's words": ("agents/replay.py", "nothing to sample", "there is nothing to sample"),
     "an optional learner": ("agents/reference.py", r"self\.updates \+= 1", "self.updates += 1 + 0"),
-    "the plan": ("study/plan.py", r"SCORE_SETS = \d+", "SCORE_SETS = 17"),
+    "the plan": ("study/plan.py", r"LEAST_MINUTES = \d+", "LEAST_MINUTES = 17"),
     "how a job is locked and signed": ("stages/running.py", r"agents: int = 1", "agents: int = 2"),
     "a line for people": ("agents/progress.py", r"_SECONDS_BETWEEN_LINES = 5\.0", "_SECONDS_BETWEEN_LINES = 6.0"),
 }
@@ -196,6 +197,22 @@ def test_a_lost_file_is_made_again(smoke: Path, loaded: Snakemake) -> None:
         finally:
             path.write_bytes(content)
     assert plan(loaded) == {}
+
+
+def test_a_run_that_was_signed_while_snakemake_was_killed_hides_nothing(smoke: Path, loaded: Snakemake) -> None:
+    """Snakemake holds it for half made; forced to make it again, it would leave out all that needs it."""
+    (signed,) = smoke.glob("results/smoke/scores/single_target/mt_csirl/velocity/reach-wall/reach-wall-t0/s0/.*.made")
+    note = base64.b64encode(str(signed.relative_to(smoke)).encode()).decode()
+    half_made, lost = smoke / ".snakemake/incomplete" / note, smoke / "paper_figs/smoke/figure_2.pdf"
+    content = lost.read_bytes()
+    half_made.parent.mkdir(parents=True, exist_ok=True)
+    half_made.touch()
+    lost.unlink()
+    try:
+        assert plan(loaded) == {"figure_2": 1}
+    finally:
+        half_made.unlink()
+        lost.write_bytes(content)
 
 
 def test_neither_times_nor_records_nor_place_decide(smoke: Path, snakemake: Snakemake, tmp_path: Path) -> None:

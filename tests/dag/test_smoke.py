@@ -16,7 +16,7 @@ from mtcsirl.rewards.learned import load_learned_reward
 from mtcsirl.settings import Settings
 from mtcsirl.study.design import ARTEFACTS, design
 from mtcsirl.study.outputs import OUTPUTS
-from mtcsirl.study.plan import request
+from mtcsirl.study.plan import request, scored_sizes
 from mtcsirl.study.rates import load_rates
 from mtcsirl.study.runs import Baseline, Expert, IrlRun, Runs, Transfer
 from mtcsirl.study.status import DONE, study_status
@@ -180,13 +180,16 @@ def test_demonstrations_are_the_experts_episodes(results: Path, study: Runs, smo
         assert frame["step"].max() == own.episode_steps - 1  # type: ignore[attr-defined]
 
 
-def test_scores_name_transitions_controls_and_statistics(results: Path, study: Runs) -> None:
+def test_scores_name_transitions_controls_and_statistics(results: Path, study: Runs, smoke_settings: Settings) -> None:
     for run in study.scores:
         scores = pd.read_csv(results / run.folder / "scores.csv")
         assert {"expert", "sac", "generator", "uniform"} <= set(scores["transitions"])
         assert {"learned", "zero", "random"} <= set(scores["reward"])
         assert {"pearson", "spearman"} <= set(scores["statistic"])
         assert scores["value"].dropna().between(-1.0001, 1.0001).all()
+        of_learned = scores[(scores["reward"] == "learned") & (scores["statistic"] == "pearson")]
+        _, sizes = scored_sizes(run, run.settings(smoke_settings).score.transitions)
+        assert of_learned.groupby("transitions", sort=False)["n"].sum().tolist() == sizes, "as planned"
         points = storage.read_parquet(results / run.folder / "points.parquet")
         assert {"transitions", "episode", "truth", "learned", "task_reward"} <= set(points.columns)
 
