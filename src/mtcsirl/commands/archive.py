@@ -1,9 +1,19 @@
-"""The verb of the evidence archive: add finished runs, check it, restore runs from it, say what is in it."""
+"""The verb of the evidence archive: add finished runs, check it, restore runs from it, draw some to make again."""
 
 import argparse
+import sys
 from pathlib import Path
 
-from mtcsirl.commands.arguments import Verbs, add_artefact, add_study_settings, add_verb, path, study_settings
+from mtcsirl.commands.arguments import (
+    Verbs,
+    add_artefact,
+    add_study_settings,
+    add_verb,
+    natural,
+    path,
+    seed,
+    study_settings,
+)
 from mtcsirl.errors import UserError
 
 ARCHIVE = Path("results/reference")
@@ -15,12 +25,15 @@ def register(verbs: Verbs) -> None:
         verbs,
         "archive",
         lambda parsed: ACTIONS[parsed.action](parsed),
-        does="keep what one needs to check every number without training, and restore runs from it",
-        needs="add: finished runs in the results folder; verify, unpack, summary: an archive",
-        writes="add: a new part below --archive; unpack: folders of runs below the results; else nothing",
+        does="keep what one needs to check every number without training, restore runs, and hold new ones against it",
+        needs="add: finished runs in the results folder; compare: runs that were made again there; else an archive",
+        writes="add: a new part below --archive; unpack, draw: folders of runs below the results; else nothing",
     )
     verb.add_argument("action", choices=tuple(ACTIONS), metavar="ACTION", help=", ".join(ACTIONS))
     verb.add_argument("--archive", type=path, default=ARCHIVE, metavar="DIR", help=f"default: {ARCHIVE}")
+    verb.add_argument("--agents", type=natural, default=12, metavar="N", help="draw: so many agents; default 12")
+    verb.add_argument("--irl-runs", type=natural, default=2, metavar="N", help="draw: so many IRL runs; default 2")
+    verb.add_argument("--draw-seed", type=seed, default=0, metavar="SEED", help="draw: decides which; default 0")
     add_artefact(verb)
     add_study_settings(verb)
 
@@ -82,4 +95,48 @@ def _summary(parsed: argparse.Namespace) -> None:
     print(f"{'in all':24}{sum(mib for *_, mib in rows):8.2f} MiB")
 
 
-ACTIONS = {"add": _add, "verify": _verify, "unpack": _unpack, "summary": _summary}
+def _draw(parsed: argparse.Namespace) -> None:
+    """Restore all but some runs and what they read that was not kept; print what to ask snakemake for."""
+    from mtcsirl.files.identity import marker
+    from mtcsirl.results.again import draw, to_be_made
+    from mtcsirl.results.archive import archived, unpack
+    from mtcsirl.study.design import design
+    from mtcsirl.study.keys import identity_of
+
+    settings = study_settings(parsed)
+    results, study = Path(settings.results), design(settings, parsed.target)
+    known = archived(_there(parsed))
+    drawn = draw(known, study, parsed.agents, parsed.irl_runs, parsed.draw_seed)
+    made = to_be_made(drawn, known)
+    if there := [folder for folder in sorted(made) if (results / folder).exists()]:
+        raise UserError(f"{results / there[0]}: is there; choose a folder without it: --set results=FOLDER")
+    unpack(parsed.archive, results, [run.folder for run in study if run.folder not in made])
+    print(f"{len(made)} runs to make, {len(drawn)} drawn; then archive compare", file=sys.stderr)
+    for run in drawn:
+        print(results / run.folder / marker(identity_of(run, settings).hash))
+
+
+def _compare(parsed: argparse.Namespace) -> None:
+    from mtcsirl.results.again import compare
+    from mtcsirl.results.archive import archived
+
+    results = Path(study_settings(parsed).results)
+    found = compare(_there(parsed), archived(parsed.archive), results)
+    if not found:
+        raise UserError(f"{results}: no archived run was made again there; archive draw says what to make")
+    for one in found:
+        same = f"{one.files - len(one.other)} of {one.files} files equal"
+        apart = ", ".join(f"{name} {there:.3g} -> {here:.3g}" for name, (there, here) in one.apart.items())
+        print(f"{one.folder}: {same}{'; ' if one.other else ''}{apart or ', '.join(one.other)}")
+    equal = sum(not one.other for one in found)
+    print(f"{equal} of {len(found)} runs have the archive's bytes")
+
+
+ACTIONS = {
+    "add": _add,
+    "verify": _verify,
+    "unpack": _unpack,
+    "summary": _summary,
+    "draw": _draw,
+    "compare": _compare,
+}

@@ -1,0 +1,92 @@
+"""Runs of the archive that are drawn, made again and compared."""
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from mtcsirl import cli
+from mtcsirl.errors import UserError
+from mtcsirl.files.identity import FILE, NOTE
+from mtcsirl.results import again, archive
+from mtcsirl.study.keys import identity_of
+from tests.results.small_study import IRL, SCORED, STUDY, settings, write
+
+EXPERT, OTHER = "expert/velocity/push-back-t0/s0", IRL.demonstrations[0].expert.folder
+BY_FOLDER = {run.folder: run for run in STUDY}
+
+
+def test_a_draw_is_the_same_for_a_seed_and_another_for_another(whole: Path) -> None:
+    known = archive.archived(whole)
+    draws = [[run.folder for run in again.draw(known, STUDY, 3, 1, seed)] for seed in (0, 0, 1, 2, 3)]
+    assert draws[0] == draws[1]
+    assert len({tuple(drawn) for drawn in draws}) > 1
+    for drawn in draws:
+        stages = [BY_FOLDER[folder].stage for folder in drawn]
+        assert len(set(drawn)) == 4
+        assert [stage in again.AGENTS for stage in stages] == [True] * 3 + [False]
+        assert stages[3] == "learn_reward"
+
+
+def test_more_than_there_are_cannot_be_drawn(whole: Path) -> None:
+    with pytest.raises(UserError, match=f"the archive holds {len(STUDY.irl_runs)} runs of learn_reward; draw at most"):
+        again.draw(archive.archived(whole), STUDY, 1, 99, 0)
+
+
+def test_what_was_not_kept_is_to_be_made_too(whole: Path) -> None:
+    """Demonstrations always; their expert, unless its policy is kept; for a new agent nothing but itself."""
+    known = archive.archived(whole)
+    shown = {run.folder for run in IRL.demonstrations}
+    experts = {run.expert.folder for run in IRL.demonstrations}
+    assert again.to_be_made([IRL], known) == {IRL.folder} | shown | (experts - SCORED)
+    assert again.to_be_made([BY_FOLDER[EXPERT]], known) == {EXPERT}
+    new = STUDY.transfers[0]
+    assert again.to_be_made([new], known) == {new.folder}
+    without = {folder: run for folder, run in known.items() if folder != new.irl.folder}
+    assert new.irl.folder in again.to_be_made([new], without)
+
+
+def test_equal_bytes_and_others(whole: Path, tmp_path: Path) -> None:
+    archive.unpack(whole, tmp_path)
+    known = archive.archived(whole)
+    assert again.compare(whole, known, tmp_path) == [], "restored runs were not made again"
+    for folder, velocity in ((EXPERT, 0.7), (OTHER, 0.6)):
+        shutil.rmtree(tmp_path / folder)
+        write(BY_FOLDER[folder], settings(tmp_path), velocity)
+    same, other = again.compare(whole, known, tmp_path)
+    assert (same.folder, same.other, same.apart) == (EXPERT, (), {})
+    assert (other.folder, other.other) == (OTHER, ("curve.csv", "evaluation.csv"))
+    assert other.apart["velocity"] == pytest.approx((0.7, 0.6), rel=0.2)
+
+
+def test_a_run_of_other_settings_is_not_compared(whole: Path, tmp_path: Path) -> None:
+    at = settings(tmp_path)
+    other = at.model_copy(update={"sac": at.sac.model_copy(update={"discount": 0.9})})
+    write(BY_FOLDER[EXPERT], other)
+    with pytest.raises(UserError, match=f"{EXPERT}: is another run than the archive's, by settings or code"):
+        again.compare(whole, archive.archived(whole), tmp_path)
+
+
+def test_the_verbs(whole: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    at = settings(tmp_path / "again")
+    words = ["--archive", str(whole), "--settings", at.model_dump_json()]
+    draw = ["archive", "draw", "--agents", "1", "--irl-runs", "0", *words]
+    assert cli.main(draw) == 0
+    said = capsys.readouterr()
+    (asked,) = said.out.splitlines()
+    drawn = BY_FOLDER[str(Path(asked).parent.relative_to(at.results))]
+    assert Path(asked).name == f".{identity_of(drawn, at).hash}.made"
+    assert "1 runs to make, 1 drawn" in said.err
+    assert not (Path(at.results) / drawn.folder).exists()
+    others = [run for run in STUDY if run != drawn]
+    assert all((Path(at.results) / run.folder / NOTE).is_file() for run in others)
+    assert cli.main(["archive", "compare", *words]) == 2
+    assert "no archived run was made again there" in capsys.readouterr().err
+    write(drawn, at)
+    assert cli.main(["archive", "compare", *words]) == 0
+    said = capsys.readouterr().out
+    assert f"{drawn.folder}: " in said
+    assert "1 of 1 runs have the archive's bytes" in said
+    assert (Path(at.results) / drawn.folder / FILE).is_file()
+    assert cli.main(draw) == 2
+    assert "is there; choose a folder without it" in capsys.readouterr().err
