@@ -113,7 +113,7 @@ def test_a_video_of_that_agent(run: Run) -> None:
 
 def test_a_wheel_that_lacks_its_data_is_seen(environment: Path, run: Run) -> None:
     """What the tests above rest on: none of them falls back on the checkout."""
-    (rates,) = environment.parent.glob("lib/python*/site-packages/mtcsirl.calibration.measure.json")
+    (rates,) = environment.parent.glob("lib/python*/site-packages/mtcsirl/study/calibration.json")
     away = rates.with_suffix(".away")
     rates.rename(away)
     try:
