@@ -10,6 +10,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from statistics import mean, median
 from typing import Any
@@ -30,11 +31,12 @@ from mtcsirl.irl.trainer import IrlTrainer
 from mtcsirl.names import METHODS, SINGLE_TASKS, TRAIN_TASKS
 from mtcsirl.results.scoring import TransitionSet, score_rows
 from mtcsirl.rewards.adapter import ground_truth
+from mtcsirl.rewards.networks import RewardNetwork
 from mtcsirl.settings import EnvironmentSettings, IrlSettings, SacSettings, Settings
 from mtcsirl.settings.loading import validate
 from mtcsirl.settings.runs import DemonstrationRunSettings, IrlRunSettings, ScoreRunSettings, irl_run
 from mtcsirl.study.rates import DEFAULT, Rates
-from mtcsirl.transitions import Transitions
+from mtcsirl.transitions import RewardFunction, Transitions
 from mtcsirl.worlds.environments import ACTION_SIZE, make_environment
 
 TASKS = tuple(dict.fromkeys((*SINGLE_TASKS, *TRAIN_TASKS)))
@@ -208,14 +210,15 @@ def _tabulated(own: IrlRunSettings) -> int:
 
 def score_seconds() -> dict[str, float]:
     """A transition set scored: without resamples, and per transition and resample."""
-    settings, resamples = ScoreRunSettings(), 20
+    settings, resamples = ScoreRunSettings(), 200
     count, random = settings.score.transitions, np.random.default_rng(0)
     observation, following = torch.from_numpy(random.normal(size=(2, count, 39)).astype(np.float32))
     columns = (observation, following[:, :4], following, observation[:, 0])
     episode = np.arange(count) // EPISODE
     chosen = TransitionSet(Transitions(*columns), np.zeros(count, dtype=int), episode)
-    setup = Setup(IrlSettings(), tasks=1, seed=0)
-    learned = make_method(USUAL_METHOD, setup).discriminators["f"].network
+    network = make_method(USUAL_METHOD, Setup(IrlSettings(), tasks=1, seed=0)).discriminators["f"].network
+    # a copy from its parameters, as a file gives it: of the discriminator's own torch would note gradients
+    learned = RewardNetwork.from_parameters(network.architecture, network.parameters.detach())
     truth = ground_truth(loops.CS_REWARD, EnvironmentSettings().observation)
     few, many = (
         settings.model_copy(update={"score": settings.score.model_copy(update={"bootstrap": n})})
@@ -224,7 +227,16 @@ def score_seconds() -> dict[str, float]:
     score_rows(learned, truth, chosen, few, 0)  # imports
     once = loops.seconds(lambda: score_rows(learned, truth, chosen, few, 0))
     more = loops.seconds(lambda: score_rows(learned, truth, chosen, many, 0))
-    controls = 4 * loops.seconds(lambda: score_rows(learned, truth, chosen, few, 0, intervals=False))
+    # what a learned reward is held beside: the truth, an untrained network, 0 and -r_task
+    others: tuple[RewardFunction, ...] = (
+        truth,
+        learned,
+        lambda transitions: torch.zeros_like(transitions.task_reward),
+        lambda transitions: -transitions.task_reward,
+    )
+    controls = 0.0
+    for one in others:
+        controls += loops.seconds(partial(score_rows, one, truth, chosen, few, 0, intervals=False))
     return {"scored": once + controls, "resampled": max(more - once, LEAST) / resamples / count}
 
 
