@@ -78,22 +78,24 @@ def compare(archive: Path, known: Mapping[str, Archived], results: Path) -> list
     Raises:
         UserError: a run there is of another identity: other settings or code.
     """
-    found = []
+    others: dict[str, tuple[str, ...]] = {}
     for folder, run in sorted(known.items()):
         record = None if (results / folder / NOTE).is_file() else read_record(results / folder)
         if record is None:
             continue
         if record.identity.hash != run.record.identity.hash:
             raise UserError(f"{results / folder}: is another run than the archive's, by settings or code")
-        other = tuple(name for name, sha in run.record.files.items() if record.files.get(name) != sha)
-        apart = _apart(archive, folder, results) if EVALUATION in other else {}
-        found.append(Again(folder, len(run.record.files), other, apart))
+        others[folder] = tuple(name for name, sha in run.record.files.items() if record.files.get(name) != sha)
+    rows = read(archive, "evaluation") if any(EVALUATION in other for other in others.values()) else pd.DataFrame()
+    found = []
+    for folder, other in others.items():
+        apart = _apart(rows[rows["folder"] == folder], results / folder) if EVALUATION in other else {}
+        found.append(Again(folder, len(known[folder].record.files), other, apart))
     return found
 
 
-def _apart(archive: Path, folder: str, results: Path) -> dict[str, tuple[float, float]]:
-    rows = read(archive, "evaluation")
-    there, here = _means(rows[rows["folder"] == folder]), _means(read_csv(results / folder / EVALUATION))
+def _apart(rows: pd.DataFrame, folder: Path) -> dict[str, tuple[float, float]]:
+    there, here = _means(rows), _means(read_csv(folder / EVALUATION))
     return {metric: (there[metric], here[metric]) for metric in COMPARED}
 
 
