@@ -6,6 +6,7 @@ python -m benchmarks --rounds 3 faster and noisier
 
 import argparse
 import os
+import re
 from pathlib import Path
 from typing import Any
 
@@ -40,9 +41,11 @@ def plot(rows: list[dict[str, Any]]) -> Figure:
     """Ratio to the peer, one bar each; resets, some 60 times faster, are in the table only. 1 is the peer itself."""
     matplotlib.use("Agg")
     rows = [row for row in rows if row["benchmark"] != "environment_resets"]
-    figure = Figure(figsize=(7.0, 0.8 + 0.24 * len(rows)), layout="constrained")
+    figure = Figure(figsize=(8.5, 0.8 + 0.24 * len(rows)), layout="constrained")
     axes = figure.add_subplot()
-    labels = [f"{row['benchmark']}: {row['setting']}" for row in rows]
+    labels = [
+        f"{row['benchmark']}: {row['setting']}, against {re.split(r' [0-9]| of ', row['peer'])[0]}" for row in rows
+    ]
     axes.barh(range(len(rows)), [row["ratio"] for row in rows], color="#0072B2")
     axes.set_yticks(range(len(rows)), labels, fontsize=7)
     axes.invert_yaxis()
