@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from mtcsirl.claims.evidence import at_least_by_chance
 from mtcsirl.claims.judging import MET, at_least, at_most, closing, staying_below, surely
 from mtcsirl.files.storage import write_json
 from mtcsirl.results.contrasts import fieller, nearness
@@ -97,7 +98,7 @@ def errors() -> Iterator[tuple[str, str, Draw]]:
         "spread 0.05, limit 0.15",
         lambda g: at_most(_normal(g, 0.15, 0.05), 0.15, "")[0] == MET,
     )
-    yield "at least (success)", "spread 0.1, limit 0.9", lambda g: at_least(_normal(g, 0.9, 0.1), 0.9, "")[0] == MET
+    yield "at least (success)", "10 episodes, success 90 %, limit 90 %", lambda g: _succeeds(g, 0.9)
     for spread in (0.05, 0.1, 0.2):
         yield (
             "equivalence (C3)", f"spreads {spread:g} of the gap, difference 25 %",
@@ -136,8 +137,13 @@ def powers() -> Iterator[tuple[str, str, Draw]]:
     for share in (0.95, 0.99):
         yield (
             "at least (success)", f"10 episodes, success {100 * share:g} %, limit 90 %",
-            lambda g, p=share: at_least(summarise(g.binomial(10, p, SEEDS) / 10), 0.9, "")[0] == MET,
+            lambda g, p=share: _succeeds(g, p),
         )  # fmt: skip
+
+
+def _succeeds(generator: np.random.Generator, share: float) -> bool:
+    found = at_least_by_chance(summarise(generator.binomial(10, share, SEEDS) / 10), 10)
+    return at_least(found, 0.9, "")[0] == MET
 
 
 def _leads(generator: np.random.Generator, lead: float, spread: float) -> bool:

@@ -75,7 +75,7 @@ def test_a_partial_correlation_that_is_worse_than_the_control_is_no_correlation(
 def test_scored_sets_stand_beside_the_judged_number():
     notes = " ".join(finding("C9").units[0].notes)
     assert "r by set: expert -0.50, sac 0.30" in notes
-    assert "5 IRL seeds, 35 agents, 70 episodes" in notes
+    assert "5 IRL seeds, 15 agents, 70 episodes" in notes, "SAC, experts and random actions are shared"
 
 
 # --- agents that are ruined ---

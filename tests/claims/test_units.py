@@ -31,7 +31,7 @@ def test_closing_by_hand():
 
 def test_falling_short_and_overshooting_count_alike():
     frame = pd.DataFrame({"velocity": [0.7, 0.9], "success": [1.0, 1.0]}, index=[0, 1])
-    group = Group("transfer", {"reach": frame}, "velocity", 0.8)
+    group = Group("transfer", {"reach": frame}, "velocity", 0.8, 10)
     assert group.distance.mean == pytest.approx(0.1)
 
 

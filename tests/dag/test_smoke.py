@@ -188,7 +188,7 @@ def test_scores_name_transitions_controls_and_statistics(results: Path, study: R
         assert {"pearson", "spearman"} <= set(scores["statistic"])
         assert scores["value"].dropna().between(-1.0001, 1.0001).all()
         of_learned = scores[(scores["reward"] == "learned") & (scores["statistic"] == "pearson")]
-        _, sizes = scored_sizes(run, run.settings(smoke_settings).score.transitions)
+        _, sizes = scored_sizes(run, run.settings(smoke_settings).score.transitions, smoke_settings)
         assert of_learned.groupby("transitions", sort=False)["n"].sum().tolist() == sizes, "as planned"
         points = storage.read_parquet(results / run.folder / "points.parquet")
         assert {"transitions", "episode", "truth", "learned", "task_reward"} <= set(points.columns)

@@ -97,6 +97,19 @@ def test_paper_stands_beside_ours(settings):
     assert "m/s" in axes.get_xlabel()
 
 
+def test_the_correlation_given_the_task_reward_stands_below_r(settings):
+    scores = pd.DataFrame([score(seed, value) for seed, value in enumerate((0.7, 0.8))])
+    given = pd.DataFrame([score(seed, value, statistic="partial") for seed, value in enumerate((0.1, 0.3))])
+    data = FigureData(settings=settings, scores=pd.concat([scores, given]), points=points(0, [0.0, 1.0], [0.0, 1.0]))
+    found = select_correlation(data, **KEY)
+    assert found.partial.value == pytest.approx(np.tanh((np.arctanh(0.1) + np.arctanh(0.3)) / 2))
+    assert found.partial_words().startswith("given r_task: r = 0.20 [")
+    assert found.partial_words() in scatter_caption(found, "velocity")
+    axes = new_figure(2, 2).subplots()
+    draw_scatter(axes, found, "mt_csirl", "velocity")
+    assert axes.texts[0].get_text().splitlines()[:2] == [found.words(), found.partial_words()]
+
+
 def test_words_without_interval_or_value():
     assert correlation_words(Estimate(0.18, np.nan, np.nan, 1)) == "r = 0.18"
     assert correlation_words(Estimate(np.nan, np.nan, np.nan, 0)) == "r undefined"

@@ -142,3 +142,15 @@ def test_power_is_the_share_of_studies_that_pass(spread, expected):
     assert np.mean(passed) == pytest.approx(power, abs=0.04)
     assert equivalence_power(summary, summary, 0.8, 0.25, np.random.default_rng(0)) == power
     assert np.isnan(equivalence_power(Summary(0.3, np.nan, 1), summary, 0.8, 0.25, np.random.default_rng(0)))
+
+
+def test_extreme_is_beyond_the_quantile_of_f():
+    """F(0.999; 4, 4) = 53.44: a ratio of standard deviations of 7.31, whichever is the larger."""
+    near, far = Summary(0.0, 7.3, 5), Summary(0.0, 7.32, 5)
+    one = Summary(9.0, 1.0, 5)
+    assert not spread_ratio(near, one).extreme
+    assert not spread_ratio(one, near).extreme
+    assert spread_ratio(far, one).extreme
+    assert spread_ratio(one, far).extreme
+    assert not spread_ratio(far, Summary(0.0, np.nan, 1)).extreme, "one seed has no spread"
+    assert not spread_ratio(Summary(0.0, 0.0, 5), Summary(0.0, 0.0, 5)).extreme

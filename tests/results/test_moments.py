@@ -32,7 +32,7 @@ def test_means_over_seeds_and_counts():
     found = beyond_task(one_reward(0.5), np.random.default_rng(0), resamples=200)
     assert found.partial.value == pytest.approx(0.5, abs=0.05)
     assert found.partial.low < found.partial.value < found.partial.high
-    assert (found.partial.n, found.agents, found.episodes) == (5, 35, 70)
+    assert (found.partial.n, found.agents, found.episodes) == (5, 15, 70)
     again = beyond_task(one_reward(0.5).sample(frac=1.0, random_state=1), np.random.default_rng(0), resamples=200)
     assert again.partial == pytest.approx(found.partial, abs=1e-9), "the order of rows decides nothing"
     one = one_reward(0.5)

@@ -3,7 +3,7 @@ import pandas as pd
 import pytest
 
 from mtcsirl.results.statistics import Summary
-from mtcsirl.tables.cells import MARK_TEXTS, MARKS, extreme_ratio, make_cell
+from mtcsirl.tables.cells import MARK_TEXTS, MARKS, make_cell
 
 UNKNOWN = Summary(np.nan, np.nan, 0)
 
@@ -55,18 +55,6 @@ def test_an_interval_that_says_nothing_is_called_uninformative():
     assert make_cell(rows(values), "velocity", Summary(1.57, 0.0, 5)).comparison == "uninformative"
     assert make_cell(rows(values), "velocity", UNKNOWN).comparison == "", "nothing to compare with"
     assert make_cell(rows([[1.0]] * 5), "velocity", Summary(1.0, 0.1, 5)).comparison == "uninformative", "ours has none"
-
-
-def test_extreme_is_beyond_the_quantile_of_f():
-    """F(0.999; 4, 4) = 53.44: a ratio of standard deviations of 7.31, whichever is the larger."""
-    near, far = Summary(0.0, 7.3, 5), Summary(0.0, 7.32, 5)
-    one = Summary(9.0, 1.0, 5)
-    assert not extreme_ratio(near, one)
-    assert not extreme_ratio(one, near)
-    assert extreme_ratio(far, one)
-    assert extreme_ratio(one, far)
-    assert not extreme_ratio(far, Summary(0.0, np.nan, 1)), "one seed has no spread"
-    assert not extreme_ratio(Summary(0.0, 0.0, 5), Summary(0.0, 0.0, 5))
 
 
 def test_ratio_divides_by_the_target():

@@ -119,10 +119,10 @@ def watch(holder: Any, *names: str, part: str = "", spent: dict[str, float] | No
 def _watch(spent: dict[str, float], holder: Any, name: str, part: str) -> None:
     inner: Callable[..., Any] = getattr(holder, name)
 
-    def call(*arguments: Any) -> Any:
+    def call(*arguments: Any, **named: Any) -> Any:
         started = thread_time()
         try:
-            return inner(*arguments)
+            return inner(*arguments, **named)
         finally:
             spent[part] += thread_time() - started
 

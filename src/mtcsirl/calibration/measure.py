@@ -10,7 +10,6 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Mapping, Sequence
-from functools import partial
 from pathlib import Path
 from statistics import mean, median
 from typing import Any
@@ -20,23 +19,18 @@ import torch
 
 from mtcsirl.agents.scripted import ScriptedExplorers
 from mtcsirl.calibration import loops
+from mtcsirl.calibration.scores import score_seconds
 from mtcsirl.episodes.demonstrations import collect_demonstrations
 from mtcsirl.episodes.evaluation import run_episode
 from mtcsirl.episodes.policy import Policy
 from mtcsirl.files.provenance import machine
 from mtcsirl.files.storage import write_parquet
-from mtcsirl.irl.methods import make_method
-from mtcsirl.irl.methods.base import Setup
 from mtcsirl.irl.trainer import IrlTrainer
 from mtcsirl.names import METHODS, SINGLE_TASKS, TRAIN_TASKS
-from mtcsirl.results.scoring import TransitionSet, score_rows
-from mtcsirl.rewards.adapter import ground_truth
-from mtcsirl.rewards.networks import RewardNetwork
-from mtcsirl.settings import EnvironmentSettings, IrlSettings, SacSettings, Settings
+from mtcsirl.settings import EnvironmentSettings, SacSettings, Settings
 from mtcsirl.settings.loading import validate
-from mtcsirl.settings.runs import DemonstrationRunSettings, IrlRunSettings, ScoreRunSettings, irl_run
+from mtcsirl.settings.runs import DemonstrationRunSettings, IrlRunSettings, irl_run
 from mtcsirl.study.rates import DEFAULT, Rates
-from mtcsirl.transitions import RewardFunction, Transitions
 from mtcsirl.worlds.environments import ACTION_SIZE, make_environment
 
 TASKS = tuple(dict.fromkeys((*SINGLE_TASKS, *TRAIN_TASKS)))
@@ -206,38 +200,6 @@ def _tabulated(own: IrlRunSettings) -> int:
     """Transitions, times policies, that one iteration tabulates with full memories."""
     shown = own.demonstration_episodes * own.evaluation.episode_steps
     return shown + (2 * own.irl.generator_replay - 1) * own.irl.steps_per_iteration
-
-
-def score_seconds() -> dict[str, float]:
-    """A transition set scored: without resamples, and per transition and resample."""
-    settings, resamples = ScoreRunSettings(), 200
-    count, random = settings.score.transitions, np.random.default_rng(0)
-    observation, following = torch.from_numpy(random.normal(size=(2, count, 39)).astype(np.float32))
-    columns = (observation, following[:, :4], following, observation[:, 0])
-    episode = np.arange(count) // EPISODE
-    chosen = TransitionSet(Transitions(*columns), np.zeros(count, dtype=int), episode)
-    network = make_method(USUAL_METHOD, Setup(IrlSettings(), tasks=1, seed=0)).discriminators["f"].network
-    # a copy from its parameters, as a file gives it: of the discriminator's own torch would note gradients
-    learned = RewardNetwork.from_parameters(network.architecture, network.parameters.detach())
-    truth = ground_truth(loops.CS_REWARD, EnvironmentSettings().observation)
-    few, many = (
-        settings.model_copy(update={"score": settings.score.model_copy(update={"bootstrap": n})})
-        for n in (1, 1 + resamples)
-    )
-    score_rows(learned, truth, chosen, few, 0)  # imports
-    once = loops.seconds(lambda: score_rows(learned, truth, chosen, few, 0))
-    more = loops.seconds(lambda: score_rows(learned, truth, chosen, many, 0))
-    # what a learned reward is held beside: the truth, an untrained network, 0 and -r_task
-    others: tuple[RewardFunction, ...] = (
-        truth,
-        learned,
-        lambda transitions: torch.zeros_like(transitions.task_reward),
-        lambda transitions: -transitions.task_reward,
-    )
-    controls = 0.0
-    for one in others:
-        controls += loops.seconds(partial(score_rows, one, truth, chosen, few, 0, intervals=False))
-    return {"scored": once + controls, "resampled": max(more - once, LEAST) / resamples / count}
 
 
 def lone_step() -> float:

@@ -15,6 +15,7 @@ from mtcsirl.claims.judging import (
     BLOCKED,
     MET,
     NOT_MET,
+    NOT_RUN,
     SHOWN,
     UNCLEAR,
     Rules,
@@ -30,12 +31,13 @@ from mtcsirl.claims.judging import (
     scaled,
     surely,
     tasks_of,
+    unjudged,
     works_at_home,
 )
 from mtcsirl.claims.scored import correlation
-from mtcsirl.results.contrasts import fieller
+from mtcsirl.results.contrasts import fieller, fieller_of
 from mtcsirl.results.published import NOT_PRINTED, Published, in_paper_order
-from mtcsirl.results.statistics import UNKNOWN_INTERVAL, Estimate, Interval, Summary, t_interval, welch
+from mtcsirl.results.statistics import UNKNOWN_INTERVAL, Estimate, Interval, Summary, contrast, t_interval, welch
 
 NO_SUCH_MEAN = "the paper's number is the mean over its unseen tasks"
 
@@ -61,7 +63,7 @@ def on_target(evidence: Evidence, rules: Rules) -> Iterator[Unit]:
             distance = scaled(group.distance, 1 / group.target)
             parts = [
                 at_most(distance, limit, "distance to the target"),
-                at_least(group.success, rules["success"], "success"),
+                at_least(group.sure_success, rules["success"], "success"),
             ]
             value = Estimate(distance.mean, *t_interval(distance), distance.n)
             theirs = abs(printed.mean / group.target - 1)
@@ -110,7 +112,7 @@ def _closing_unit(
     group, sac = evidence.transfers(source, tasks), evidence.sac(cs, tasks)
     parts = [
         closing(group.distance, sac.distance, rules["at_least"]),
-        at_least(group.success, rules["success"], "success"),
+        at_least(group.sure_success, rules["success"], "success"),
     ]
     theirs = closed_in_paper(printed.mean, printed_sac, group.target)
     value = closed(group.distance, sac.distance)
@@ -161,8 +163,7 @@ def _worse_metric(
     cs = ours.cs_reward
     terms = (1.0, theirs.distance), (-1.0, ours.distance), (-needed, sac.distance)
     part = surely(f"farther from the target by {100 * needed:g} % of SAC's gap", *terms)
-    gap, test = sac.distance.mean or float("nan"), welch(theirs.distance, ours.distance)
-    value = Estimate(test.difference / gap, test.low / gap, test.high / gap, theirs.distance.n)
+    value = fieller_of([(1.0, theirs.distance), (-1.0, ours.distance)], sac.distance)
     best, worst, printed = (paper.unseen(name, cs, cs).mean for name in (method, "sac", other))
     lost = closed_in_paper(best, worst, ours.target) - closed_in_paper(printed, worst, ours.target)
     return judged_unit(
@@ -175,9 +176,9 @@ def _worse_success(
     ours: Group, theirs: Group, what: str, needed: float, paper: Published, method: str, other: str
 ) -> Unit:
     cs = ours.cs_reward
-    part = surely(f"less success by {100 * needed:g} points", (1.0, ours.success), (-1.0, theirs.success),
-                  constant=-needed)  # fmt: skip
-    test = welch(ours.success, theirs.success)
+    terms = (1.0, ours.sure_success), (-1.0, theirs.sure_success)
+    part = surely(f"less success by {100 * needed:g} points", *terms, constant=-needed)
+    test = contrast(*terms)
     value = Estimate(test.difference, test.low, test.high, theirs.success.n)
     lost = paper.unseen(method, cs, "success").mean - paper.unseen(other, cs, "success").mean
     return judged_unit(
@@ -193,9 +194,9 @@ def suffers_without(evidence: Evidence, rules: Rules) -> Iterator[Unit]:
         source = single_target(cs, task)
         with_it = evidence.generators(source)
         without = evidence.generators(replace(source, experiment=rules["experiment"]))
-        terms = (1.0, with_it.success), (-1.0, without.success)
+        terms = (1.0, with_it.sure_success), (-1.0, without.sure_success)
         parts = [surely(f"less success without it by {100 * needed:g} points", *terms, constant=-needed)]
-        test = welch(with_it.success, without.success)
+        test = contrast(*terms)
         value = Estimate(test.difference, test.low, test.high, without.success.n)
         unit = judged_unit(
             cs, task, without, parts, "success lost without the curriculum", value, holds=Interval(needed, np.inf)
@@ -222,17 +223,18 @@ def _against_single(evidence: Evidence, rules: Rules, several: RewardSource, sin
     lead, needed = behind(theirs, ours), rules["advantage"]
     parts = [
         surely(f"closer than {home}'s by {100 * needed:g} % of SAC's gap", (1.0, lead), (-needed, sac.distance)),
-        at_least(ours.success, rules["success"], "success"),
+        at_least(ours.sure_success, rules["success"], "success"),
     ]
     value = fieller(lead, sac.distance)
     unit = judged_unit(
         cs, task, ours, parts, "lead over one task's reward / SAC's gap", value, holds=Interval(needed, np.inf),
         paper_value=_lead_in_paper(evidence.published, cs, home, task, rules["method"], ours.target),
     )  # fmt: skip
-    unit = checked(evidence, against(unit, ours, theirs, f"{home}'s reward"), rules, single, ours, theirs, own, sac)
-    why = evidence.blocked(several, ["experts"], rules["gates"])
+    groups = ours, theirs, own, sac
+    unit = checked(evidence, against(unit, ours, theirs, f"{home}'s reward"), rules, single, *groups, pairs=lead.n)
+    why, failed = evidence.blocked(several, ["experts"], rules["gates"])
     if why and unit.state in (MET, NOT_MET, UNCLEAR):
-        return replace(unit, state=BLOCKED, reason=why)
+        return unjudged(unit, BLOCKED if failed else NOT_RUN, why)
     return works_at_home(unit, own, sac_own, rules["needs_diagonal"])
 
 

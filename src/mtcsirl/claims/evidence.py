@@ -1,7 +1,7 @@
 """What the claims are judged on: groups of agents, their distances to the target, and their preconditions."""
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -22,14 +22,15 @@ from mtcsirl.study.runs import IrlRun, Score
 class Group:
     """One kind of agent over seeds and tasks, judged by one cs-reward with the target value ``target``.
 
-    ``agents``: per task a frame of the stochastic policy's metrics [seed, metric]; ``last``: the same agents with their
-    last policies where the kept ones are judged, else None.
+    ``agents``: per task a frame of the stochastic policy's metrics [seed, metric]; ``episodes``: that each of them had;
+    ``last``: the same agents with their last policies where the kept ones are judged, else None.
     """
 
     stage: str
     agents: Mapping[str, pd.DataFrame]
     cs_reward: str
     target: float
+    episodes: int
     last: "Group | None" = None
 
     @property
@@ -41,7 +42,7 @@ class Group:
     def on(self, task: str) -> "Group":
         """The group on one of its tasks."""
         last = None if self.last is None else self.last.on(task)
-        return Group(self.stage, {task: self.agents[task]}, self.cs_reward, self.target, last)
+        return replace(self, agents={task: self.agents[task]}, last=last)
 
     def values(self, metric: str) -> pd.DataFrame:
         """``metric`` [seed, task]; NaN where an agent is not usable."""
@@ -73,6 +74,11 @@ class Group:
         """Share of successful episodes over seeds, mean over tasks per seed."""
         return summarise(per_seed(self.values("success")))
 
+    @property
+    def sure_success(self) -> Summary:
+        """``success`` with at least the spread that its episodes have by chance."""
+        return at_least_by_chance(self.success, self.episodes * len(self.agents))
+
     @cached_property
     def step_distance(self) -> Summary:
         """E|m - tau| of single steps over seeds: no oscillation about the target hides in it. n = 0 if not recorded."""
@@ -82,6 +88,15 @@ class Group:
 def per_seed(values: pd.DataFrame) -> pd.Series:
     """Mean over tasks of each seed [seed]; NaN if one of its tasks is not usable."""
     return values.mean(axis=1, skipna=False)
+
+
+def at_least_by_chance(success: Summary, episodes: int) -> Summary:
+    """The share p with a spread over seeds of at least sqrt(p (1 - p) / episodes), which so many episodes a seed have.
+
+    Seeds that happen to agree on 9 of 10 episodes are no surer of it than seeds that do not.
+    """
+    mean, std, n = success
+    return Summary(mean, max(std, float(np.sqrt(max(mean * (1 - mean), 0.0) / episodes))), n)
 
 
 def behind(far: Group, near: Group) -> Summary:
@@ -141,7 +156,7 @@ class Evidence:
         def of(agents: pd.DataFrame, places: Mapping[Any, Any], last: Group | None) -> Group:
             found = {task: places.get((*names, task, target), nothing) for task in tasks}
             frames = {task: agents.iloc[place].set_index("seed") for task, place in found.items()}
-            return Group(key["stage"], frames, cs_reward, goal, last)
+            return Group(key["stage"], frames, cs_reward, goal, self.settings.evaluation.episodes, last)
 
         tasks = tuple(tasks)
         last = of(self._last, self._places[1], None) if len(self._last) else None
@@ -165,12 +180,14 @@ class Evidence:
             source.cs_reward, tasks or source.tasks, {"stage": "learn_reward", **source.key}, source.targets[0]
         )
 
-    def blocked(self, source: "RewardSource", needs: Iterable[str], share: float) -> str:
-        """Which of ``needs`` ("experts", "generators") of ``source`` failed their gate too often; "" if none did.
+    def blocked(self, source: "RewardSource", needs: Iterable[str], share: float) -> tuple[str, bool]:
+        """Which of ``needs`` ("experts", "generators") of ``source`` failed their gate too often, or are not known to
+        have passed it; ("", False) if none. True: they failed, whatever those that are missing will do.
 
         An expert passes if it and its demonstrations do. Of n agents the whole number nearest to ``share`` x n has to
-        pass, so that one of three may fail where 80 % are asked for.
+        pass, so that one of three may fail where 80 % are asked for. Those that are missing count in n.
         """
+        seeds = {"experts": source.expert_seeds(self.settings), "generators": self.settings.irl_seeds}
         keys: dict[str, dict[str, Any]] = {
             "experts": {
                 "stage": ["train_expert", "collect_demonstrations"],
@@ -182,12 +199,16 @@ class Evidence:
             "generators": {"stage": "learn_reward", **source.key},
         }
         for name in needs:
-            judged = select(self._agents, **keys[name])
-            judged = judged[~judged["status"].isin([MISSING, STALE])]
-            passed = (judged["status"] == OK).groupby([judged["task"], judged["target"], judged["seed"]]).all()
-            if passed.sum() < int(share * len(passed) + 0.5):
-                return f"{passed.sum()} of {len(passed)} {name} passed their gate"
-        return ""
+            found = select(self._agents, **keys[name])
+            each = [found["task"], found["target"], found["seed"]]
+            passed = int((found["status"] == OK).groupby(each).all().sum())
+            failed = int((~found["status"].isin([OK, MISSING, STALE])).groupby(each).any().sum())
+            count = len(source.tasks) * len(source.targets) * len(set(seeds[name]))
+            needed = int(share * count + 0.5)
+            if passed < needed:
+                unknown = f", {count - passed - failed} missing" if count > passed + failed else ""
+                return f"{passed} of {count} {name} passed their gate{unknown}", count - failed < needed
+        return "", False
 
     def scored(self, source: "RewardSource", task: str) -> pd.DataFrame:
         """The single transitions on which the rewards of ``source`` were scored for ``task``."""

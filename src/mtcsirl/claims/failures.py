@@ -13,9 +13,11 @@ from mtcsirl.claims.judging import (
     FARTHER,
     LIKE_SAC,
     MET,
+    NO_GAP,
     NOT_MET,
     RUINED,
     TRANSFERS,
+    UNCLEAR,
     UNDECIDED,
     Answer,
     Rules,
@@ -27,6 +29,7 @@ from mtcsirl.claims.judging import (
     closed_in_paper,
     closing,
     judged_unit,
+    no_gap,
     staying_below,
     surely,
     tasks_of,
@@ -47,7 +50,7 @@ def equivalent_to_sac(evidence: Evidence, rules: Rules) -> Iterator[Unit]:
             group, sac = evidence.transfers(source, [task]), evidence.sac(cs, [task])
             margin = rules["margin"]
             near = nearness(group.metric, sac.metric, group.target, margin)
-            success = at_least(group.success, rules["success"], "success")
+            success = at_least(group.sure_success, rules["success"], "success")
             parts = [
                 three_way(near.inside, near.above or near.below, f"within {100 * margin:g} % of SAC's gap of SAC"),
                 success,
@@ -55,17 +58,20 @@ def equivalent_to_sac(evidence: Evidence, rules: Rules) -> Iterator[Unit]:
             power = equivalence_power(group.metric, sac.metric, group.target, margin, np.random.default_rng(0))
             measure = "part of the gap from SAC to the target closed"
             unit = judged_unit(
-                cs, task, group, parts, measure, closed(group.gap, sac.gap), outcome=_outcome(success, near),
-                power=power, holds=Interval(-margin, margin),
+                cs, task, group, parts, measure, closed(group.gap, sac.gap), power=power,
+                outcome=_outcome(success, near, group, sac), holds=Interval(-margin, margin),
             )  # fmt: skip
             yield checked(evidence, against(unit, group, sac, "SAC"), rules, source, group, sac)
 
 
-def _outcome(success: Answer, near: Nearness) -> str:
+def _outcome(success: Answer, near: Nearness, group: Group, sac: Group) -> str:
     if success[0] == NOT_MET:
         return RUINED
-    if near.above or near.below:
-        return TRANSFERS if near.above else FARTHER
+    if near.below:
+        return FARTHER
+    if near.above:  # on the target's side of SAC, but perhaps far beyond the target
+        nearer, _ = surely("", (1.0, sac.distance), (-1.0, group.distance))
+        return {MET: TRANSFERS, NOT_MET: FARTHER}.get(nearer, UNDECIDED)
     return LIKE_SAC if near.inside and success[0] == MET else UNDECIDED
 
 
@@ -97,15 +103,21 @@ def stays_behind(evidence: Evidence, rules: Rules) -> Iterator[Unit]:
                 Summary(printed * group.target, np.nan, paper.seeds), outcome=_summed(outcomes),
                 paper_value=closed_in_paper(printed, printed_sac, 1.0), holds=Interval(-np.inf, rules["at_most"]),
             )  # fmt: skip
-            unit = checked(evidence, against(unit, group, own, "own task"), rules, source, group, sac, own, sac_own)
+            groups, pairs = (group, sac, own, sac_own), behind(group, own).n
+            unit = checked(evidence, against(unit, group, own, "own task"), rules, source, *groups, pairs=pairs)
             # Transfer elsewhere contradicts the claim, whatever becomes of the reward's own task.
             against_it = unit.state == NOT_MET and TRANSFERS in outcomes
             yield unit if against_it else works_at_home(unit, own, sac_own, rules["needs_diagonal"])
 
 
 def _fate(group: Group, sac: Group, rules: Rules) -> Answer:
-    """Of one task: whether the behaviour surely does not transfer to an agent that succeeds, and what became of it."""
-    success = at_least(group.success, rules["success"], "")
+    """Of one task: whether the behaviour surely does not transfer to an agent that succeeds, and what became of it.
+
+    A task without a gap says neither: whoever is near SAC there is on target too.
+    """
+    if no_gap(sac, rules):
+        return UNCLEAR, NO_GAP
+    success = at_least(group.sure_success, rules["success"], "")
     much = closing(group.distance, sac.distance, rules["needs_diagonal"])
     little = staying_below(group.distance, sac.distance, rules["needs_diagonal"])
     if success[0] == NOT_MET:
@@ -114,7 +126,8 @@ def _fate(group: Group, sac: Group, rules: Rules) -> Answer:
         outcome = TRANSFERS
     else:
         like = staying_below(group.distance, sac.distance, rules["at_most"])
-        outcome = LIKE_SAC if worst([success, like]) == MET else UNDECIDED
+        away = staying_below(group.distance, sac.distance, -rules["at_most"])
+        outcome = (FARTHER if away[0] == MET else LIKE_SAC) if worst([success, like]) == MET else UNDECIDED
     return worst([success, little]), outcome
 
 
@@ -128,5 +141,5 @@ def _most(states: list[str], share: float) -> Answer:
 
 def _summed(outcomes: list[str]) -> str:
     """As in "3 like SAC, 1 agent ruined"; all alike: without numbers."""
-    names = [name for name in (LIKE_SAC, TRANSFERS, RUINED, FARTHER, UNDECIDED) if name in outcomes]
+    names = [name for name in (LIKE_SAC, TRANSFERS, RUINED, FARTHER, UNDECIDED, NO_GAP) if name in outcomes]
     return names[0] if len(names) == 1 else ", ".join(f"{outcomes.count(name)} {name}" for name in names)

@@ -77,7 +77,7 @@ def _small(found: Beyond, rules: Rules) -> Answer:
         return UNCLEAR, _nothing(found)
     small = abs(partial.value) <= limit and max(abs(partial.low), abs(partial.high)) <= rules["surely"]
     state, reason = three_way(small, partial.low > limit or partial.high < -limit, f"partial r at most {limit:g}")
-    if state == MET and raw.low > limit:
+    if state == MET and (raw.low > limit or raw.high < -limit):
         return UNCLEAR, f"r = {raw.value:.2f} across policies, but by r_task alone"
     return state, f"{reason}: {state}"
 

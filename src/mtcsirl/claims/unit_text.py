@@ -19,8 +19,8 @@ COLUMNS = {
     "measure": "what the criterion looks at",
     "ours_in_prediction": "ours in the paper's prediction interval",
     "paper_in_interval": "paper's in our t-interval",
-    "difference": "differs from the reference (Welch)",
-    "effect": "Hedges' g against the reference",
+    "difference": "metric differs from the reference's (Welch)",
+    "effect": "Hedges' g of the metric against the reference",
     "why": "why",
     "notes": "beside it",
 }

@@ -36,10 +36,14 @@ TRANSITION_SETS = {
 
 @dataclass(frozen=True)
 class Correlation:
-    """Points and correlation of one learned reward on one transition set, all seeds; ``paper`` is its number or NaN."""
+    """Points and correlation of one learned reward on one transition set, all seeds.
+
+    ``partial``: the correlation given r_task, as r alone may be that of the task reward. ``paper``: its r, or NaN.
+    """
 
     points: pd.DataFrame
     estimate: Estimate
+    partial: Estimate
     transitions: str
     paper: float
 
@@ -62,6 +66,10 @@ class Correlation:
         """As in ``r = 0.18 [0.05, 0.30]``."""
         return correlation_words(self.estimate)
 
+    def partial_words(self) -> str:
+        """As in ``given r_task: r = 0.18 [0.05, 0.30]``; nothing where it was not scored."""
+        return "" if np.isnan(self.partial.value) else f"given r_task: {correlation_words(self.partial)}"
+
 
 def select_correlation(
     data: FigureData,
@@ -72,19 +80,23 @@ def select_correlation(
     source: str,
     transitions: str = PRIMARY_TRANSITIONS,
 ) -> Correlation:
-    """Points and Pearson r of the learned reward of ``source`` on ``transitions``.
+    """Points, Pearson's r and the partial r given r_task of the learned reward of ``source`` on ``transitions``.
 
     Over seeds r is averaged on Fisher's z scale with a t-interval; one seed keeps the interval that its own row has.
     """
     wanted = {"experiment": experiment, "method": method, "cs_reward": cs_reward, "source": source}
     points = rows_where(data.points, wanted | {"transitions": transitions})
-    rows = rows_where(data.scores, wanted | {"transitions": transitions, "reward": "learned", "statistic": "pearson"})
-    estimate = mean_correlation(rows["value"])
+    scores = rows_where(data.scores, wanted | {"transitions": transitions, "reward": "learned"})
+    paper = load_published().correlation(experiment, cs_reward).mean
+    return Correlation(points, _over_seeds(scores, "pearson"), _over_seeds(scores, "partial"), transitions, paper)
+
+
+def _over_seeds(scores: pd.DataFrame, statistic: str) -> Estimate:
+    rows = rows_where(scores, {"statistic": statistic})
     if len(rows) == 1:
         row = rows.iloc[0]
-        estimate = Estimate(row["value"], row["low"], row["high"], 1)
-    paper = load_published().correlation(experiment, cs_reward).mean
-    return Correlation(points, estimate, transitions, paper)
+        return Estimate(row["value"], row["low"], row["high"], 1)
+    return mean_correlation(rows["value"])
 
 
 def draw_scatter(axes: Axes, found: Correlation, method: str, cs_reward: str) -> None:
@@ -116,9 +128,10 @@ def draw_scatter(axes: Axes, found: Correlation, method: str, cs_reward: str) ->
         axes.plot(ends, slope * ends + offset, color="black", linewidth=1, linestyle="--")
     low, high = np.percentile(standard["learned"], [0.2, 99.8])
     margin = 0.08 * max(high - low, 1e-6)
-    axes.set_ylim(low - margin, high + 7 * margin)  # room for the words above the points
+    axes.set_ylim(low - margin, high + 8 * margin)  # room for the words above the points
     paper = "" if np.isnan(found.paper) else f"\npaper: r = {found.paper:.2f}"
-    words = f"{found.words()}\n{found.transition_name}\n{found.counts()}{paper}"
+    lines = (found.words(), found.partial_words(), found.transition_name, found.counts())
+    words = "\n".join(filter(None, lines)) + paper
     axes.text(
         0.03, 0.98, words, transform=axes.transAxes, va="top", fontsize=6.5,
         bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1},
@@ -149,9 +162,11 @@ def scatter_caption(found: Correlation, cs_reward: str) -> str:
     paper = "" if np.isnan(found.paper) else f" (paper: {found.paper:.2f})"
     if found.points.empty and np.isnan(found.estimate.value):
         return f"True against learned {quantity(cs_reward)} cs-reward{paper}: {NO_RUNS}."
+    partial = found.partial_words() and f"{found.partial_words()}, "
     return (
         f"True against learned {quantity(cs_reward)} cs-reward on {found.transition_name}: "
-        f"Pearson {found.words()}{paper}, {interval}, {found.counts()} with up to {found.per_seed:,} transitions each; "
+        f"Pearson {found.words()}{paper}, {partial}{interval}, {found.counts()} with up to {found.per_seed:,} "
+        "transitions each; "
         f"at most {SHOWN_POINTS:,} points are drawn, without the outermost 0.4 %. The learned reward is standardised "
         "per seed."
     )

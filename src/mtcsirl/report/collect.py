@@ -1,7 +1,7 @@
 """Reads what the DAG left and turns it into the content of the start page."""
 
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -49,9 +49,11 @@ def collect(settings: Settings, page: Path, *, partial: bool = False) -> ReportD
         raise MissingError(f"{path}: not there")
     there = [name for name in ARTEFACTS if name not in dict(missing)]
     judged = _judged(claims.with_suffix(".json"), partial)
+    verdicts = claims_of(judged, claims.with_suffix(".json"))
+    _check_runs(verdicts, settings, claims.with_suffix(".json"))
     return ReportData(
         run=_what_was_run(settings, study, provenance),
-        claims=claims_of(judged, claims.with_suffix(".json")),
+        claims=verdicts,
         tables=tuple(_table(name, settings, page) for name in there if name.startswith("table_")),
         figures=tuple(_figure(name, settings, page) for name in there if name.startswith("figure_")),
         gates=_gates(study, results),
@@ -177,6 +179,14 @@ def _distinct(items: Iterator[str]) -> tuple[str, ...]:
 def _judged(path: Path, partial: bool) -> dict[str, Any]:
     """``claims.json``; empty if there is none yet and ``partial``."""
     return {"claims": []} if partial and not path.is_file() else storage.read_json(path)
+
+
+def _check_runs(claims: Iterable[Claim], settings: Settings, path: Path) -> None:
+    """No verdict stands on runs that are not there, as those of a file left by another study do."""
+    folders = {folder for claim in claims for unit in claim.units for folder in unit.folders}
+    gone = sorted(folder for folder in folders if not (Path(settings.results) / folder).is_dir())
+    if gone:
+        raise UserError(f"{path}: judged {gone[0]}, which is not there; judge again by mtcsirl claims --partial")
 
 
 def claims_of(judged: dict[str, Any], path: Path | str = "claims.json") -> tuple[Claim, ...]:

@@ -3,6 +3,7 @@
 Everything here reads summaries (mean, std, n) of independent seeds; notation as in :mod:`mtcsirl.results.statistics`.
 """
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -92,22 +93,34 @@ def fieller(numerator: Summary, denominator: Summary, confidence: float = 0.95) 
     d_0, so that the set holds exactly the ratios which that contrast accepts. Where the denominator is not surely
     different from 0 the set has no finite ends, and the interval is (-inf, inf).
     """
-    value = numerator.mean / denominator.mean if denominator.mean else np.nan
-    if numerator.n < 2 or denominator.n < 2 or not np.isfinite(value):
-        return Estimate(value, np.nan, np.nan, numerator.n)
-    if numerator.std == 0 and denominator.std == 0:
-        return Estimate(value, value, value, numerator.n)
+    return fieller_of([(1.0, numerator)], denominator, confidence)
+
+
+def fieller_of(terms: Sequence[tuple[float, Summary]], denominator: Summary, confidence: float = 0.95) -> Estimate:
+    """As ``fieller``, of a sum of weight x mean over ``terms`` of independent samples; n is the first one's."""
+    numerator, n = sum(weight * summary.mean for weight, summary in terms), terms[0][1].n
+    value = numerator / denominator.mean if denominator.mean else np.nan
+    samples = [denominator, *(summary for _, summary in terms)]
+    if min(summary.n for summary in samples) < 2 or not np.isfinite(value):
+        return Estimate(value, np.nan, np.nan, n)
+    if not any(summary.std for summary in samples):
+        return Estimate(value, value, value, n)
 
     def excess(angle: float) -> float:
         """|d cos - d_0 sin| minus what the contrast accepts; rho is the tangent of the angle."""
-        test = contrast((float(np.cos(angle)), numerator), (-float(np.sin(angle)), denominator), confidence=confidence)
+        scaled = [(float(np.cos(angle)) * weight, summary) for weight, summary in terms]
+        test = contrast(*scaled, (-float(np.sin(angle)), denominator), confidence=confidence)
         return abs(test.difference) - (test.high - test.low) / 2
 
     if excess(np.pi / 2) <= 0:
-        return Estimate(value, -np.inf, np.inf, numerator.n)
+        return Estimate(value, -np.inf, np.inf, n)
     best = float(np.arctan(value))
     low, high = (np.tan(brentq(excess, *sorted((best, side * np.pi / 2)))) for side in (-1, 1))
-    return Estimate(value, float(low), float(high), numerator.n)
+    return Estimate(value, float(low), float(high), n)
+
+
+EXTREME = 0.002
+"""Two-sided: F beyond its 99.9 % quantile, the larger spread above."""
 
 
 class SpreadRatio(NamedTuple):
@@ -118,8 +131,8 @@ class SpreadRatio(NamedTuple):
 
     @property
     def extreme(self) -> bool:
-        """The two spreads are surely not those of the same quantity."""
-        return bool(self.p < 0.05)
+        """The two spreads are surely not those of the same quantity; a study has dozens of such pairs."""
+        return bool(self.p < EXTREME)
 
 
 def spread_ratio(first: Summary, second: Summary) -> SpreadRatio:

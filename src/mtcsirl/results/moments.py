@@ -80,7 +80,7 @@ class Beyond:
     """What rewards of several IRL seeds say beyond the task, each with a 95 % interval; n: IRL seeds.
 
     ``partial``: r_fc.t across policies; ``beyond``: r(f, c) - r(-t, c) there; ``raw``: r(f, c) there; ``agents`` and
-    ``episodes`` are counted over all sets and seeds.
+    ``episodes`` are counted over all sets and seeds, agents that several IRL seeds share once.
     """
 
     partial: Estimate
@@ -117,9 +117,15 @@ def beyond_task(points: pd.DataFrame, generator: np.random.Generator, *, resampl
         partial=over_seeds("partial", fisher=True),
         beyond=over_seeds("beyond", fisher=False),
         raw=over_seeds("raw", fisher=True),
-        agents=len(sums[["seed", "transitions", "agent"]].drop_duplicates()),
+        agents=_agents(sums),
         episodes=len(sums),
     )
+
+
+def _agents(sums: pd.DataFrame) -> int:
+    """Different ones: those of ``SHARED``, and random actions, are the same in every IRL run."""
+    own = sums[["seed", "transitions", "agent"]].drop_duplicates()
+    return len(own.assign(seed=own["seed"].where(own["transitions"] == "generator", -1)).drop_duplicates())
 
 
 def _mean_over_seeds(values: Array, draws: Array, fisher: bool) -> Estimate:

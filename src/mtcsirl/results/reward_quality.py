@@ -17,6 +17,7 @@ from scipy.stats import rankdata
 
 from mtcsirl.files import storage
 from mtcsirl.results.correlation import Correlation, partial_correlation, pearson
+from mtcsirl.results.points import read_points
 from mtcsirl.results.statistics import Array, cluster_bootstrap, summarise, t_interval
 from mtcsirl.study.runs import Score
 
@@ -56,7 +57,7 @@ def read_quality(runs: Sequence[Score], results: Path | str, resamples: int) -> 
             "task": run.task, "seed": irl.seed,
         }  # fmt: skip
         folder = Path(results) / run.folder
-        points.append(storage.read_parquet(folder / "points.parquet", _NEEDED).assign(**key))
+        points.append(read_points(folder / "points.parquet", _NEEDED).assign(**key))
         needed = ("transitions", "reward", "statistic", "value")
         scores.append(storage.read_csv(folder / "scores.csv", needed).assign(**key))
     if not points:

@@ -15,6 +15,7 @@ from mtcsirl.errors import MissingError, UserError
 from mtcsirl.files import storage
 from mtcsirl.names import CS_REWARDS, DIVERGED, KEPT, LAST, distance_metric
 from mtcsirl.results.completeness import POLICIES, what_lacks
+from mtcsirl.results.points import read_points
 from mtcsirl.settings import Settings
 from mtcsirl.study import standing as standings
 from mtcsirl.study.runs import AnyRun, Baseline, Demonstrations, Expert, IrlRun, Runs, Transfer
@@ -99,12 +100,15 @@ def score_rows(study: Runs, settings: Settings, *, partial: bool = False) -> pd.
 
 
 def point_rows(study: Runs, settings: Settings, *, partial: bool = False) -> pd.DataFrame:
-    """Single transitions of those correlations, ``POINT_COLUMNS`` + task; missing and stale runs have no rows."""
+    """Single transitions of those correlations, ``POINT_COLUMNS`` + task; missing and stale runs have no rows.
+
+    Without the first of each episode (:mod:`mtcsirl.results.points`).
+    """
     return _of_scores(study, settings, "points.parquet", (*POINT_COLUMNS, "task"), partial)
 
 
 def _of_scores(study: Runs, settings: Settings, name: str, columns: tuple[str, ...], partial: bool) -> pd.DataFrame:
-    read = storage.read_parquet if name.endswith("parquet") else storage.read_csv
+    read = read_points if name.endswith("parquet") else storage.read_csv
     own = (*RUN_KEY, "task")
     frames = []
     for run in study.scores:

@@ -124,7 +124,7 @@ class MultiTaskSettings(Frozen):
 
     train_tasks: Tasks = key(TRAIN_TASKS, "tasks with experts; rows of Table 4", paper=TRAIN_TASKS)
     train_targets: Targets = key((1,), "targets per task; T = tasks x targets", paper=(1, 2, 3, 4, 5))
-    unseen_tasks: Tasks = key(UNSEEN_TASKS, "tasks of Table 2 and Figure 3", paper=UNSEEN_TASKS)
+    unseen_tasks: Tasks = key(UNSEEN_TASKS, "tasks of Table 2 and Figure 3; the paper names them in a missing figure")
 
     @model_validator(mode="after")
     def _really_unseen(self) -> "MultiTaskSettings":
@@ -168,6 +168,7 @@ class ExpertSettings(RewardScaleSettings):
             "action_norm": {"coffee-button": 3.0, "plate-slide": 2.0},
         },
         "factor on cs_weight per task: more where the task pays for staying where it is done",
+        paper={name: dict.fromkeys(("coffee-button", "plate-slide"), 1.0) for name in CS_REWARDS},
     )
     held_share: dict[CsReward, Shares] = key(
         lambda: {

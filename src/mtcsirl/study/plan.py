@@ -93,23 +93,27 @@ def _of_irl(run: IrlRun, settings: Settings, rates: Rates, together: int = 1) ->
 @cost.register
 def _of_score(run: Score, settings: Settings, rates: Rates, together: int = 1) -> Cost:
     score = run.settings(settings).score
-    acted, sizes = scored_sizes(run, score.transitions)
-    seconds = rates.start_up + rates.frames + acted * _episode_step(run.task, rates)
+    acted, sizes = scored_sizes(run, score.transitions, settings)
+    seconds = rates.start_up + rates.frames + acted * (_episode_step(run.task, rates) + rates.recorded)
     seconds += len(sizes) * rates.scored + score.bootstrap * sum(sizes) * rates.resampled
     return Cost(seconds, score_memory(run.irl.settings(settings), len(run.irl.members)), 1.0)
 
 
-def scored_sizes(run: Score, wanted: int) -> tuple[int, list[int]]:
+def scored_sizes(run: Score, wanted: int, settings: Settings) -> tuple[int, list[int]]:
     """Transitions that policies act for, and those of each transition set (results/scoring.py).
 
     Whole episodes, as many of each policy of a set: the experts, the baselines, and the one of random actions. Then the
-    generators' last ones, and equal parts of these four.
+    generators' last ones, as far as there are so many, and equal parts of these four.
     """
     steps = min(EPISODE_STEPS, wanted)
     own = [
         steps * policies * ceil(wanted / (steps * policies)) for policies in (len(run.experts), len(run.baselines), 1)
     ]
-    return sum(own), [*own, wanted, 4 * min(*own, wanted)]
+    irl, members = run.irl.settings(settings).irl, len(run.irl.members)
+    rollouts = min(SAMPLED_ROLLOUTS, irl.warm_up_iterations + irl.iterations)
+    per_member = max(1, wanted // (irl.steps_per_iteration * members))
+    last = min(per_member, rollouts) * irl.steps_per_iteration * members
+    return sum(own), [*own, last, 4 * min(*own, last)]
 
 
 def _agent(own: AgentRunSettings, task: str, rates: Rates, tried: int, together: int) -> Cost:

@@ -5,9 +5,9 @@ from typing import Any, Literal
 
 import numpy as np
 import pandas as pd
-from scipy import stats
 
 from mtcsirl.names import KEPT
+from mtcsirl.results.contrasts import spread_ratio
 from mtcsirl.results.notes import Note, lacks_notes
 from mtcsirl.results.rows import BELOW_GATE, DUPLICATED, FOREIGN, INCOMPLETE, MISSING, STALE, matrix, select
 from mtcsirl.results.statistics import (
@@ -25,8 +25,6 @@ from mtcsirl.results.statistics import (
 DASH = "–"
 PAPER_DIGITS = 2
 RESAMPLES = 500
-EXTREME = 0.999
-"""Two spreads whose ratio of variances lies beyond this quantile of F are no spreads of the same kind."""
 MARKS = {"below": "†", "missing": "‡", "doubtful": "§", "incomplete": "¶", "stale": "‖", "diverged": "×"}
 """Doubt about agents, printed with their number."""
 MARK_TEXTS = {
@@ -71,7 +69,7 @@ class Cell:
         """Where our mean lies as the paper predicts it; "" where one of the two is not there."""
         if np.isnan(self.paper.mean) or np.isnan(self.ours.mean):
             return ""
-        if np.isnan(self.prediction.low) or extreme_ratio(self.ours, self.paper):
+        if np.isnan(self.prediction.low) or spread_ratio(self.paper, self.ours).extreme:
             return "uninformative"
         return "inside" if self.prediction.contains(self.ours.mean) else "outside"
 
@@ -120,19 +118,6 @@ def unusable(rows: pd.DataFrame) -> tuple[Note, ...]:
     """What incomplete agents lack and why stale ones are stale, by their folders."""
     found = select(rows, status=(INCOMPLETE, STALE))[["folder", "lacks"]].drop_duplicates()
     return lacks_notes(found.itertuples(index=False, name=None))
-
-
-def extreme_ratio(first: Summary, second: Summary, quantile: float = EXTREME) -> bool:
-    """Whether s1^2 / s2^2 (the larger above) lies beyond the ``quantile`` of F(n1 - 1, n2 - 1).
-
-    A spread of 0 beside one that is not 0 always does; unknown spreads never do.
-    """
-    if first.n < 2 or second.n < 2 or np.isnan(first.std) or np.isnan(second.std):
-        return False
-    (small, below), (large, above) = sorted(((first.std, first.n), (second.std, second.n)))
-    if small == 0:
-        return bool(large > 0)
-    return bool((large / small) ** 2 > stats.f.ppf(quantile, above - 1, below - 1))
 
 
 def make_cell(rows: pd.DataFrame, metric: str, paper: Summary, scale: float = 1.0) -> Cell:

@@ -66,11 +66,16 @@ def _entries(settings: Settings, paper: dict[str, Any]) -> list[tuple[str, Any, 
             paper["automatic_entropy_tuning"],
         ),
         (
-            "Automatic entropy tuning (generators, transfer agents)",
-            settings.irl.temperature == settings.transfer.temperature == "automatic",
+            "Automatic entropy tuning (new agents)",
+            settings.transfer.temperature == "automatic",
             paper["automatic_entropy_tuning"],
         ),
-        ("Factor on the reward (experts, baseline)", settings.baseline.reward_scale, None),
+        (
+            "Automatic entropy tuning (generators)",
+            settings.irl.temperature == "automatic",
+            paper["automatic_entropy_tuning"],
+        ),
+        ("Factor on the reward (experts, baseline)", settings.baseline.reward_scale, 1.0),
         ("Random steps before training", sac.random_steps, None),
     ]
 
