@@ -103,7 +103,7 @@ def test_the_correlation_given_the_task_reward_stands_below_r(settings):
     data = FigureData(settings=settings, scores=pd.concat([scores, given]), points=points(0, [0.0, 1.0], [0.0, 1.0]))
     found = select_correlation(data, **KEY)
     assert found.partial.value == pytest.approx(np.tanh((np.arctanh(0.1) + np.arctanh(0.3)) / 2))
-    assert found.partial_words().startswith("given r_task: r = 0.20 [")
+    assert found.partial_words().startswith("given r_task: 0.20 [")
     assert found.partial_words() in scatter_caption(found, "velocity")
     axes = new_figure(2, 2).subplots()
     draw_scatter(axes, found, "mt_csirl", "velocity")

@@ -67,8 +67,9 @@ class Correlation:
         return correlation_words(self.estimate)
 
     def partial_words(self) -> str:
-        """As in ``given r_task: r = 0.18 [0.05, 0.30]``; nothing where it was not scored."""
-        return "" if np.isnan(self.partial.value) else f"given r_task: {correlation_words(self.partial)}"
+        """As in ``given r_task: 0.18 [0.05, 0.30]``; nothing where it was not scored."""
+        known = not np.isnan(self.partial.value)
+        return f"given r_task: {correlation_words(self.partial).removeprefix('r = ')}" if known else ""
 
 
 def select_correlation(
@@ -133,7 +134,7 @@ def draw_scatter(axes: Axes, found: Correlation, method: str, cs_reward: str) ->
     lines = (found.words(), found.partial_words(), found.transition_name, found.counts())
     words = "\n".join(filter(None, lines)) + paper
     axes.text(
-        0.03, 0.98, words, transform=axes.transAxes, va="top", fontsize=6.5,
+        0.03, 0.98, words, transform=axes.transAxes, va="top", fontsize=6,
         bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1},
     ).set_in_layout(False)  # fmt: skip
 
