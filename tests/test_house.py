@@ -13,7 +13,7 @@ import pytest
 from tests.conftest import CHECKOUT
 
 PACKAGE = CHECKOUT / "src" / "mtcsirl"
-_ROOMS = """names errors transitions extensions slurm files worlds rewards settings episodes agents irl study results
+_ROOMS = """names errors transitions slurm files worlds rewards extensions settings episodes agents irl study results
 stages claims tables figures report validation calibration exports commands cli"""
 ROOMS = tuple(_ROOMS.split())
 """Packages and modules below ``mtcsirl``; each may import the ones before it."""

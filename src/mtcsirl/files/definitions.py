@@ -200,7 +200,23 @@ def _examine(module: str, node: ast.stmt) -> tuple[str, frozenset[Definition], f
 
 
 def file_hash(path: Path) -> str:
-    """The hash of a whole Python file outside of the package, comments and docstrings left out."""
-    module = _parsed(path, "")
-    tree = _Canonical(module).visit(ast.parse(path.read_text(encoding="utf-8")))
-    return hashlib.sha256(ast.dump(tree).encode()).hexdigest()[:12]
+    """The hash of a whole Python file outside of the package, comments and docstrings left out.
+
+    What it imports from elsewhere counts, under which name and in which order whatsoever: in the tree of a module of
+    the package the names of definitions stand for that, here nothing else does.
+    """
+    text = path.read_text(encoding="utf-8")
+    tree = _Canonical(_parsed(path, "")).visit(ast.parse(text))
+    imported = sorted(set(_imported_elsewhere(ast.parse(text))))
+    return hashlib.sha256("\n".join([ast.dump(tree), *imported]).encode()).hexdigest()[:12]
+
+
+def _imported_elsewhere(tree: ast.AST) -> Iterator[str]:
+    """``dotted name as local name`` of every import but those of the package, whose names the tree resolves."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            yield from (f"{alias.name} as {alias.asname}" for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            source = "." * node.level + (node.module or "")
+            if source.partition(".")[0] != NAME:
+                yield from (f"{source}.{alias.name} as {alias.asname or alias.name}" for alias in node.names)

@@ -10,7 +10,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 from mtcsirl import names
-from mtcsirl.extensions import METHODS, Builder
+from mtcsirl.extensions import BUILDERS, METHODS, Builder, probe_methods_with
 
 if TYPE_CHECKING:
     from mtcsirl.irl.discriminator import Method
@@ -23,7 +23,14 @@ def _builder(name: str) -> Builder:
     return lambda setup: getattr(import_module(f"mtcsirl.irl.methods.{name}"), name)(setup)
 
 
-METHODS.update({name: _builder(name) for name in names.METHODS})
+def _probe(build: Builder) -> None:
+    from mtcsirl.irl.methods.probe import check_method
+
+    check_method(build)
+
+
+BUILDERS.update({name: _builder(name) for name in names.METHODS})
+probe_methods_with(_probe)
 
 
 def make_method(name: str, setup: Setup) -> Method:
