@@ -11,6 +11,9 @@ import pytest
 
 from mtcsirl.errors import UserError
 from mtcsirl.extensions import load_extensions
+from mtcsirl.names import TASKS
+from mtcsirl.study.keys import read_folder
+from mtcsirl.study.runs import Demonstrations
 
 NAMED = re.compile(r"^`(\w+\.(?:py|yaml))`:.*?^```(?:python|yaml)\n(.*?)^```", re.MULTILINE | re.DOTALL)
 
@@ -68,6 +71,15 @@ def test_what_is_wrong_with_an_extension_is_one_line(tmp_path: Path) -> None:
     (tmp_path / "broken.py").write_text("1 / 0\n")
     with pytest.raises(UserError, match=r"broken\.py: ZeroDivisionError: division by zero"):
         load_extensions([tmp_path / "broken.py"])
+
+
+def test_the_demonstrations_of_the_command_are_where_a_study_leaves_them(checkout: Path) -> None:
+    page = (checkout / "docs/extending.md").read_text(encoding="utf-8")
+    (path,) = re.findall(r"--demonstrations (\S+)", page)
+    folder, name = path.removeprefix("results/").rsplit("/", 1)
+    key = read_folder(Demonstrations.PATTERN, folder)
+    assert key is not None, f"{path} is none of {Demonstrations.PATTERN}"
+    assert (key["cs_reward"], key["task"] in TASKS, name) == ("velocity", True, "demonstrations.parquet")
 
 
 @pytest.mark.dag

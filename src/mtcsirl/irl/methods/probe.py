@@ -41,6 +41,9 @@ def _check_discriminators(discriminators: Mapping[str, Discriminator]) -> None:
             logits = discriminator.logits(_batch())
         for logit in logits:
             check_tensor(f"{who}: its logit", logit, _SHAPE, wanted)
+    for name, rewards, made_by in (("f", 1, "shared"), ("task", _TASKS, "per_task")):
+        found = len(discriminators[name].network.parameters) if name in discriminators else rewards
+        must(found == rewards, f"discriminators[{name!r}] has {found} rewards", f"{rewards}, as of Setup.{made_by}")
 
 
 def _check_policy_reward(made: Method) -> None:
