@@ -60,6 +60,8 @@ def made(setup, **changes):
     loss = Adversarial(changes.pop("logit", LOGIT))
     parts = {"f": setup.shared(setup.perceptron(), loss)}
     return replace(Method(parts, pay, True, True), **changes)
+def f(setup): return made(setup).discriminators["f"]
+def per_task(setup): return setup.per_task(setup.perceptron(), Adversarial(LOGIT))
 def add(build, key="mine"): METHODS[key] = build
 def raising(setup): raise ValueError("one\\ntwo")
 """
@@ -73,10 +75,10 @@ WRONG_METHODS = {
     "add(lambda setup: made(setup, discriminators=None))": "discriminators = None; must be a dict of discriminators",
     "add(lambda setup: made(setup, discriminators={'f': 3}))": "discriminators['f'] is 3; must be a Discriminator",
     "add(lambda s: made(s, discriminators={'g': made(s).discriminators['f']}))": "discriminators: g; must be at least",
-    "add(lambda s: made(s, discriminators={'f': s.per_task(s.perceptron(), Adversarial(LOGIT))}))": "discriminators['f']"
-    " has 2 rewards; must be 1, as of Setup.shared",
-    "add(lambda s: made(s, discriminators=made(s).discriminators | {'task': made(s).discriminators['f']}))": "discrimi"
-    "nators['task'] has 1 rewards; must be 2, as of Setup.per_task",
+    "add(lambda s: made(s, discriminators={'f': per_task(s)}))": "discriminators['f'] has 2 rewards; must be 1, as of "
+    "Setup.shared",
+    "add(lambda s: made(s, discriminators={'f': f(s), 'task': f(s)}))": "discriminators['task'] has 1 rewards; must be 2,"
+    " as of Setup.per_task",
     "add(lambda s: made(s, policy_reward=3))": "policy_reward = 3; must be a function",
     "add(lambda s: made(s, policy_reward=lambda t, learned, a: learned['g']))": "policy_reward: KeyError: 'g'; "
     "must return a tensor of shape [2, 3] from the task reward, the learned f and alpha",
