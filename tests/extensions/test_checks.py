@@ -77,8 +77,8 @@ WRONG_METHODS = {
     "add(lambda s: made(s, discriminators={'g': made(s).discriminators['f']}))": "discriminators: g; must be at least",
     "add(lambda s: made(s, discriminators={'f': per_task(s)}))": "discriminators['f'] has 2 rewards; must be 1, as of "
     "Setup.shared",
-    "add(lambda s: made(s, discriminators={'f': f(s), 'task': f(s)}))": "discriminators['task'] has 1 rewards; must be 2,"
-    " as of Setup.per_task",
+    "add(lambda s: made(s, discriminators={'f': f(s), 'task': f(s)}))": "discriminators['task'] has 1 rewards; must be"
+    " 2, as of Setup.per_task",
     "add(lambda s: made(s, policy_reward=3))": "policy_reward = 3; must be a function",
     "add(lambda s: made(s, policy_reward=lambda t, learned, a: learned['g']))": "policy_reward: KeyError: 'g'; "
     "must return a tensor of shape [2, 3] from the task reward, the learned f and alpha",
