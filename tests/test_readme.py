@@ -3,11 +3,14 @@
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 from scipy import stats
 
 from mtcsirl.results.archive import archived, read
-from mtcsirl.results.statistics import mean_correlation
+from mtcsirl.results.moments import beyond_task
+from mtcsirl.results.points import EPISODE, without_first
+from mtcsirl.results.statistics import Estimate, mean_correlation
 
 ROWS = {
     "experts": "expert/{metric}/reach-wall-t0",
@@ -22,23 +25,25 @@ CORRELATIONS = {
     "one task, action norm": "scores/single_target/mt_csirl/action_norm/reach-wall/reach-wall-t0",
     "six tasks, action norm": "scores/multi_task/mt_csirl/action_norm/all/reach-wall-t0",
 }
-"""The words before each r in the README, and the folder of its scores."""
+"""The first cell of each row of the README's correlations, and the folder of its scores."""
 
 
-def correlations(text: str) -> dict[str, str]:
-    """As in ``0.78 [0.72, 0.83]``, by the words before it."""
-    words = "|".join(CORRELATIONS)
-    return dict(re.findall(rf"({words}) (\d\.\d\d \[-?\d\.\d\d, \d\.\d\d\])", " ".join(text.split())))
+def in_words(estimate: Estimate) -> str:
+    return f"{estimate.value:.2f} [{estimate.low:.2f}, {estimate.high:.2f}]"
 
 
-def correlations_from_archive(archive: Path) -> dict[str, str]:
-    """The mean over seeds of Pearson's r on the transitions of plain SAC."""
-    rows = read(archive, "scores").query("statistic == 'pearson' and reward == 'learned' and transitions == 'sac'")
+def correlations_from_archive(archive: Path) -> dict[str, list[str]]:
+    """r on the transitions of plain SAC, mean over seeds, and the partial r that claims are judged by."""
+    pearson = read(archive, "scores").query("statistic == 'pearson' and reward == 'learned' and transitions == 'sac'")
+    points = read(archive, "points")
     found = {}
     for words, folder in CORRELATIONS.items():
-        own = mean_correlation(rows[rows["folder"].str.startswith(folder)]["value"])
-        assert own.n == 5, f"{words}: n = 5"
-        found[words] = f"{own.value:.2f} [{own.low:.2f}, {own.high:.2f}]"
+        own = mean_correlation(pearson[pearson["folder"].str.startswith(folder)]["value"])
+        scored = points[points["folder"].str.startswith(folder)]
+        scored = scored.assign(seed=scored["folder"].str.rpartition("/s")[2].astype(int))
+        judged = beyond_task(without_first(scored, ["folder", *EPISODE]), np.random.default_rng(0)).partial
+        assert own.n == judged.n == 5, f"{words}: n = 5"
+        found[words] = [in_words(own), in_words(judged)]
     return found
 
 
@@ -46,6 +51,12 @@ def cells(text: str) -> dict[str, list[str]]:
     """The table's rows by their first cell."""
     rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in text.splitlines() if line[:2] == "| "]
     return {first: rest for first, *rest in rows if first in ROWS}
+
+
+def correlations(text: str) -> dict[str, list[str]]:
+    """The rows of the correlations by their first cell, without the paper's."""
+    rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in text.splitlines() if line[:2] == "| "]
+    return {first: rest[:2] for first, *rest in rows if first in CORRELATIONS}
 
 
 def from_archive(archive: Path) -> dict[str, list[str]]:
@@ -75,7 +86,7 @@ def test_a_changed_number_is_noticed(checkout: Path, changed: tuple[str, str]) -
     assert cells(text) != from_archive(checkout / "results" / "reference")
 
 
-@pytest.mark.parametrize("changed", [("0.27 [0.00", "0.87 [0.00"), ("[0.09, 0.27]", "[0.08, 0.27]")])
+@pytest.mark.parametrize("changed", [("0.27 [0.00", "0.87 [0.00"), ("[0.22, 0.48]", "[0.23, 0.48]")])
 def test_a_changed_correlation_is_noticed(checkout: Path, changed: tuple[str, str]) -> None:
     text = (checkout / "README.md").read_text(encoding="utf-8").replace(*changed, 1)
     assert correlations(text) != correlations_from_archive(checkout / "results" / "reference")

@@ -20,6 +20,10 @@ def read_points(path: Path | str, columns: Sequence[str]) -> pd.DataFrame:
     Raises:
         UserError: the file is missing or unreadable, or lacks a column.
     """
-    points = storage.read_parquet(path, tuple(dict.fromkeys((*columns, *EPISODE))))
-    first, more = ~points.duplicated(EPISODE), points.duplicated(EPISODE, keep=False)
+    return without_first(storage.read_parquet(path, tuple(dict.fromkeys((*columns, *EPISODE)))))
+
+
+def without_first(points: pd.DataFrame, episode: list[str] = EPISODE) -> pd.DataFrame:
+    """``points`` without the first of each episode, which the columns ``episode`` name together."""
+    first, more = ~points.duplicated(episode), points.duplicated(episode, keep=False)
     return points[~(first & more)]
