@@ -1,22 +1,27 @@
 """A small study, finished and made up, whose runs have files of all their kinds."""
 
+from itertools import count
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
 import torch
 
+from mtcsirl.episodes.gates import gate_verdict, stochastic_means
 from mtcsirl.episodes.policy import Policy, save_policy
 from mtcsirl.files import storage
+from mtcsirl.files.identity import FILE, Record, checksums, dumps, read_record, result_files
 from mtcsirl.files.provenance import Stopwatch, write_provenance
 from mtcsirl.results import archive
 from mtcsirl.rewards.learned import LearnedReward, save_learned_reward
 from mtcsirl.rewards.networks import RewardNetwork
 from mtcsirl.settings import EvaluationSettings, Settings
 from mtcsirl.study.design import design
+from mtcsirl.study.keys import identity_of
 from mtcsirl.study.outputs import OUTPUTS
-from mtcsirl.study.runs import AnyRun, Demonstrations, IrlRun, Score
-from tests.results.made_up import sign, write_demonstrations, write_run
+from mtcsirl.study.runs import AnyRun, Demonstrations, Expert, IrlRun, Score
+from tests.results.made_up import write_demonstrations, write_run
 
 SEVERAL = {
     "seeds": (0,),
@@ -87,8 +92,50 @@ def write(run: AnyRun, at: Settings, velocity: float = 0.7) -> None:
     elif "policy.json" in OUTPUTS[run.stage]:
         save_policy(_policy(4), folder)
     storage.write_json(folder / "settings.json", run.settings(at).model_dump(mode="json"))
-    write_provenance(folder, Stopwatch())
-    sign(run, at)
+    if (folder / "gate.json").is_file():
+        storage.write_json(folder / "gate.json", gate(run, at))
+    write_provenance(folder, _stopwatch())
+    sign_with_inputs(run, at)
+
+
+def gate(run: AnyRun, at: Settings) -> dict[str, Any]:
+    """The gate that follows from the run's episodes."""
+    limits, cs_reward = run.settings(at).gates, getattr(run, "cs_reward", "velocity")
+    if isinstance(run, Demonstrations):
+        return gate_verdict("expert", {"success": 1.0, "velocity": 0.75, "diverged": 0.0}, "velocity", limits)
+    rows = storage.read_csv(Path(at.results) / run.folder / "evaluation.csv")
+    if not isinstance(run, IrlRun):
+        name = "expert" if isinstance(run, Expert) else "sac"
+        return gate_verdict(name, stochastic_means(rows.to_dict("records")), cs_reward, limits)
+    members = []
+    for task, target in run.members:
+        own = rows[(rows["task"] == task) & (rows["target"] == target)]
+        verdict = gate_verdict("generator", stochastic_means(own.to_dict("records")), cs_reward, limits)
+        members.append({"task": task, "target": target, **verdict})
+    means = {name: float(np.mean([member[name] for member in members])) for name in ("success", "metric")}
+    passed, diverged = all(one["passed"] for one in members), sum(one["diverged"] for one in members)
+    said = {"gate": "generator", "passed": passed, "limits": members[0]["limits"], "diverged": diverged}
+    return said | means | {"members": members}
+
+
+def sign_with_inputs(run: AnyRun, at: Settings) -> None:
+    """As :func:`sign`, with what the run read, where that is there."""
+    results = Path(at.results)
+    there = {role: read_record(results / needed.folder) for role, needed in run.needs.items()}
+    read = {role: record.bytes for role, record in there.items() if record is not None}
+    folder = results / run.folder
+    record = Record(identity_of(run, at), checksums(folder, result_files(folder)), read)
+    storage.write_text(folder / FILE, dumps(record))
+
+
+_MADE = count(1)
+
+
+def _stopwatch() -> Stopwatch:
+    """No two runs take the same time."""
+    watch = Stopwatch()
+    watch.add({"wall_seconds": next(_MADE), "cpu_seconds": 0.0, "peak_memory_mib": 0.0})
+    return watch
 
 
 def add(folder: Path, results: Path) -> Path | None:

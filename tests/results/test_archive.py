@@ -121,8 +121,9 @@ def test_a_restored_study_is_done_for_everyone(whole, tmp_path):
         assert (tmp_path / run.folder / f".{wanted[run.folder]}.made").is_file()
     assert {status.state for status in study_status(STUDY, at)} == {DONE}
     assert list(faults(tmp_path)) == []
-    task = Task(identity_of(IRL, at), IRL.settings(at), tmp_path / IRL.folder)
-    assert finished(task)
+    record = read_record(tmp_path / IRL.folder)
+    assert record is not None
+    assert finished(Task(record.identity, IRL.settings(at), tmp_path / IRL.folder, record.read))
 
 
 def _lose(folder: Path) -> None:
@@ -228,7 +229,11 @@ def test_a_run_made_again_is_a_new_part_and_replaces_the_old_one_in_reads(copy, 
     assert (tmp_path / "out" / IRL.folder / "curve.csv").read_bytes() == (
         results / IRL.folder / "curve.csv"
     ).read_bytes()
-    assert archive.verify(copy) == []
+    readers = {run.folder for run in STUDY if IRL in run.needs.values()}
+    wrong = archive.verify(copy)
+    assert len(wrong) == len(readers) > 0
+    for folder in readers:
+        assert f"{copy}: {folder}: its reward had other bytes than the archive's {IRL.folder}" in wrong
     assert len(archive.read(copy, "evaluation")) == len(archive.read(copy, "evaluation").drop_duplicates())
 
 

@@ -69,8 +69,11 @@ def dumps(record: Record) -> str:
     return json.dumps(said, sort_keys=True, separators=(",", ":"), allow_nan=False) + "\n"
 
 
-def parse_record(text: str, where: str) -> Record:
-    """The record that ``dumps`` wrote.
+REMAKE = "delete its folder and make it again"
+
+
+def parse_record(text: str, where: str, way_out: str = REMAKE) -> Record:
+    """The record that ``dumps`` wrote; ``way_out``: what a reader may do about one that is damaged.
 
     Raises:
         UserError: it is damaged or does not fit its own hash.
@@ -79,11 +82,23 @@ def parse_record(text: str, where: str) -> Record:
         said = json.loads(text)
         identity = Identity(said["stage"], said["key"], said["settings"], said["code"], said["inputs"])
         record = Record(identity, said["files"], said["read"])
+        _check_shape(record)
         if said["format"] != FORMAT or said["hash"] != identity.hash:
             raise ValueError("it does not fit its own hash")
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
-        raise UserError(f"{where}: not a readable identity ({error}); delete its folder and make it again") from error
+        raise UserError(f"{where}: not a readable identity ({error}); {way_out}") from error
     return record
+
+
+def _check_shape(record: Record) -> None:
+    """Raises ValueError where a part of a record is of another kind than ``dumps`` writes."""
+    own = record.identity
+    texts = {"files": record.files, "read": record.read, "code": own.code, "inputs": own.inputs}
+    for name, found in texts.items():
+        if not isinstance(found, dict) or not all(isinstance(value, str) for value in found.values()):
+            raise ValueError(f"its {name} are not texts by name")
+    if not isinstance(own.stage, str) or not isinstance(own.key, dict) or not isinstance(own.settings, dict):
+        raise ValueError("its stage, key or settings are of another kind")
 
 
 def read_record(folder: Path | str) -> Record | None:
@@ -98,7 +113,7 @@ def read_record(folder: Path | str) -> Record | None:
     except FileNotFoundError:
         return None
     except (OSError, UnicodeDecodeError) as error:
-        raise UserError(f"{path}: not a readable identity ({error}); delete its folder and make it again") from error
+        raise UserError(f"{path}: not a readable identity ({error}); {REMAKE}") from error
 
 
 def digest_of(content: bytes) -> str:

@@ -11,7 +11,8 @@ from __future__ import annotations
 
 import os
 import shutil
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
@@ -20,13 +21,13 @@ import pandas as pd
 
 from mtcsirl.errors import UserError
 from mtcsirl.files import storage
-from mtcsirl.files.identity import FILE, NOTE, Record, digest_of, lost, note, parse_record, read_record, result_files
-from mtcsirl.results.packing import BLOBS, FRAMES, INDEX, TEXTS, Frames, by_folder, kept, packed, unpacked
+from mtcsirl.files.identity import FILE, NOTE, Record, lost, note, parse_record, read_record, result_files
+from mtcsirl.results.packing import BLOBS, FRAMES, INDEX, POINTS, PROVENANCE, TEXTS, Frames, by_folder, kept, packed
+from mtcsirl.results.parts import AGAIN, FORMAT, MANIFEST, check, frame, frames, number_of, strangers
+from mtcsirl.results.parts import parts as parts
+from mtcsirl.results.soundness import Told, faults_of_inputs, faults_of_run, files_of, foreign
 from mtcsirl.study.runs import Runs
 
-MANIFEST = "manifest.json"
-FORMAT = "mtcsirl archive 1"
-AGAIN = "get this part again from where the archive came from"
 LEVEL = 19
 """Of zstd: a part is written once and read often."""
 
@@ -40,6 +41,8 @@ class Archived:
     record: Record
     kept: frozenset[str]
     """Its result files that come back."""
+    provenance: str
+    """SHA-256 of its ``provenance.json``; a run that was made again has another."""
 
 
 @dataclass(frozen=True)
@@ -58,11 +61,6 @@ def policies_kept(study: Runs) -> set[str]:
     return {run.folder for score in study.scores for run in (*score.experts, *score.baselines)}
 
 
-def parts(archive: Path) -> list[Path]:
-    """The folders of the archive, in the order in which they were added."""
-    return sorted(path for path in archive.glob(f"part-{'[0-9]' * 4}") if path.is_dir())
-
-
 def archived(archive: Path) -> dict[str, Archived]:
     """The runs of the archive by their folder; of a run that was added twice, the last.
 
@@ -73,12 +71,14 @@ def archived(archive: Path) -> dict[str, Archived]:
 
 
 def _of_part(part: Path) -> Iterator[Archived]:
-    _check(part)
-    texts, index = _frame(part, TEXTS), _frame(part, INDEX)
-    names = index[index["kept"]].groupby("folder", observed=True)["file"].agg(frozenset)
+    check(part)
+    texts, index = frame(part, TEXTS), frame(part, INDEX)
+    names = index[index["kept"]].groupby("folder", observed=True)["file"].agg(frozenset).to_dict()
+    provenance = index[index["file"] == PROVENANCE].groupby("folder", observed=True)["sha256"].last().to_dict()
     for folder, text in texts.loc[texts["file"] == FILE, ["folder", "content"]].itertuples(index=False):
-        record = parse_record(text, f"{part}: {folder}")
-        yield Archived(folder, part.name, record, names[folder] & frozenset(record.files))
+        record = parse_record(text, f"{part}: {folder}", AGAIN)
+        own = names.get(folder, frozenset()) & frozenset(record.files)
+        yield Archived(folder, part.name, record, own, provenance.get(folder, ""))
 
 
 def add(archive: Path, results: Path, folders: Iterable[str], with_policies: Collection[str]) -> Path | None:
@@ -91,18 +91,22 @@ def add(archive: Path, results: Path, folders: Iterable[str], with_policies: Col
         UserError: a run is not what its record says, or would not come back byte for byte.
     """
     with storage.locked(archive):
+        for left in archive.glob(".part-*"):
+            shutil.rmtree(left, ignore_errors=True)
         known = archived(archive)
         new = [folder for folder in folders if _is_new(known.get(folder), results / folder, folder in with_policies)]
         if not new:
             return None
-        number = max((int(part.name.removeprefix("part-")) for part in parts(archive)), default=0) + 1
+        number = max(map(number_of, parts(archive)), default=0) + 1
         part, draft = archive / f"part-{number:04d}", archive / f".part-{number:04d}"
-        shutil.rmtree(draft, ignore_errors=True)
-        _write(draft, results, new, with_policies)
-        wrong = list(faults_of(draft))
-        if wrong:
-            raise UserError(f"nothing was added: {wrong[0]}")
-        os.rename(draft, part)
+        try:
+            _write(draft, results, new, with_policies)
+            wrong = list(faults_of(draft))
+            if wrong:
+                raise UserError(f"nothing was added: {wrong[0]}")
+            os.rename(draft, part)
+        finally:
+            shutil.rmtree(draft, ignore_errors=True)
         return part
 
 
@@ -118,18 +122,19 @@ def _whole(source: Path) -> Record:
     record = read_record(source)
     if record is None or lost(source, record):
         raise UserError(f"{source}: no finished run; add it when it is done")
+    if strange := foreign(record):
+        raise UserError(f"{source / strange[0]}: no kind of file that the archive knows; make the run again")
     return record
 
 
 def _write(draft: Path, results: Path, folders: Iterable[str], with_policies: Collection[str]) -> None:
     rows: dict[str, list[pd.DataFrame]] = {name: [] for name in FRAMES}
     for folder in folders:
-        for name, frame in packed(results / folder, folder, _whole(results / folder), folder in with_policies):
-            rows[name].append(frame)
-    for name, frames in rows.items():
-        if frames:
-            frame = pd.concat(frames, ignore_index=True)
-            storage.write_parquet(draft / f"{name}.parquet", frame, level=LEVEL)
+        for name, own in packed(results / folder, folder, _whole(results / folder), folder in with_policies):
+            rows[name].append(own)
+    for name, own in rows.items():
+        if own:
+            storage.write_parquet(draft / f"{name}.parquet", pd.concat(own, ignore_index=True), level=LEVEL)
     sums = {path.name: storage.checksum(path) for path in sorted(draft.glob("*.parquet"))}
     storage.write_json(draft / MANIFEST, {"format": FORMAT, "files": sums})
 
@@ -145,11 +150,13 @@ def unpack(archive: Path, results: Path, folders: Iterable[str] | None = None) -
     known = archived(archive)
     wanted = list(known) if folders is None else [folder for folder in folders if folder in known]
     free = [folder for folder in wanted if not _taken(results / folder)]
-    for part in parts(archive):
-        chosen = {folder for folder in free if known[folder].part == part.name}
-        if chosen:
-            rows = by_folder({name: frame[frame["folder"].isin(chosen)] for name, frame in _frames(part).items()})
-            for folder in sorted(chosen):
+    chosen = {part: {folder for folder in free if known[folder].part == part.name} for part in parts(archive)}
+    for fault in (fault for part, own in chosen.items() if own for fault in faults_of(part)):
+        raise UserError(f"nothing was restored: {fault}")
+    for part, own in chosen.items():
+        if own:
+            rows = by_folder({name: found[found["folder"].isin(own)] for name, found in frames(part).items()})
+            for folder in sorted(own):
                 _restore(known[folder], results / folder, rows[folder])
     return Unpacked(tuple(free), tuple(folder for folder in wanted if folder not in set(free)))
 
@@ -163,64 +170,53 @@ def _taken(folder: Path) -> bool:
 
 def _restore(run: Archived, target: Path, own: Frames) -> None:
     """The note first and the record last, so that whatever is between them is known to be unfinished."""
-    files = _files(own)
-    wrong = list(_faults_of_run(run.folder, own, files))
-    if wrong:
-        raise UserError(f"{run.part}: {wrong[0]}")
+    files = files_of(own)
+    said = note(run.record, set(run.record.files) - set(files)).encode()
     last = files.pop(FILE)
     with storage.locked(target):
-        storage.write_text(target / NOTE, note(run.record, set(run.record.files) - set(files)))
-        for name, content in files.items():
-            storage.restore(target / name, content)
-        storage.restore(target / FILE, last)
+        written: list[Path] = []
+        try:
+            for name, content in {NOTE: said, **files, FILE: last}.items():
+                written.append(target / name)
+                storage.restore(target / name, content)
+        except OSError as error:
+            for path in written:
+                with suppress(OSError):
+                    storage.remove(path)
+            raise OSError(error.errno, error.strerror, str(written[-1])) from error
 
 
-def verify(archive: Path) -> list[str]:
-    """What is wrong with the archive, one line each: parts, checksums, identities, bytes of every kept file."""
-    found = parts(archive)
-    names = [f"part-{number + 1:04d}" for number in range(len(found))]
-    wrong = [f"{archive / name}: lost, or not a part" for name in names if not (archive / name).is_dir()]
-    for part in found:
-        wrong += faults_of(part)
+def verify(archive: Path, folders: Collection[str] | None = None) -> list[str]:
+    """What is wrong with the archive, one line each: parts, checksums, identities, bytes, gates, what was read.
+
+    ``folders``: say it of these runs alone, and of the parts.
+    """
+    wrong = list(strangers(archive))
+    for part in parts(archive):
+        wrong += faults_of(part, folders)
+    if not wrong:
+        known = archived(archive).values()
+        told = (Told(run.folder, run.record.identity, run.record.read, run.record.bytes) for run in known)
+        wrong += [f"{archive}: {fault}" for folder, fault in faults_of_inputs(told) if _asked(folder, folders)]
     return wrong
 
 
-def faults_of(part: Path) -> Iterator[str]:
-    """What is wrong with one part."""
+def _asked(folder: str, folders: Collection[str] | None) -> bool:
+    return folders is None or folder in folders
+
+
+def faults_of(part: Path, folders: Collection[str] | None = None) -> Iterator[str]:
+    """What is wrong with one part, and with these runs of it (None: all)."""
     try:
-        _check(part)
-        rows = by_folder(_frames(part))
+        check(part)
+        rows = by_folder(frames(part))
     except UserError as error:
         yield str(error)
         return
     for folder, own in rows.items():
-        for fault in _faults_of_run(folder, own, _files(own)):
-            yield f"{part}: {fault}"
-
-
-def _files(own: Frames) -> dict[str, bytes]:
-    """The kept files of a run; none where its rows are no archive's."""
-    try:
-        return unpacked(own)
-    except (KeyError, ValueError, TypeError, AttributeError):
-        return {}
-
-
-def _faults_of_run(folder: str, own: Frames, files: Mapping[str, bytes]) -> Iterator[str]:
-    """What of one run differs from its record and its index."""
-    try:
-        record = parse_record(files[FILE].decode(), folder)
-        index = own[INDEX].set_index("file")
-    except (KeyError, ValueError, UserError) as error:
-        yield f"{folder}: no rows of an archive ({error})"
-        return
-    for name in sorted({*index.index, *record.files, *files}):
-        if name not in index.index:
-            yield f"{folder}/{name}: not in {INDEX}"
-        elif name in record.files and record.files[name] != index.at[name, "sha256"]:
-            yield f"{folder}/{name}: another checksum than in its identity"
-        elif index.at[name, "kept"] and (name not in files or digest_of(files[name]) != index.at[name, "sha256"]):
-            yield f"{folder}/{name}: is not what its run wrote"
+        if _asked(folder, folders):
+            for fault in faults_of_run(folder, own, files_of(own)):
+                yield f"{part}: {fault}"
 
 
 def read(archive: Path, name: str) -> pd.DataFrame:
@@ -232,56 +228,31 @@ def read(archive: Path, name: str) -> pd.DataFrame:
     if name not in FRAMES:
         raise UserError(f"no frame {name!r} in the archive; it has {', '.join(FRAMES)}")
     latest = {folder: run.part for folder, run in archived(archive).items()}
-    frames = []
+    found = []
     for part in parts(archive):
         if (part / f"{name}.parquet").is_file():
-            frame = _frame(part, name)
-            frames.append(frame[frame["folder"].map(latest) == part.name])
+            rows = frame(part, name)
+            found.append(rows[rows["folder"].map(latest) == part.name])
     if name == BLOBS:
-        frames = [_points(*row) for frame in frames for row in frame[["folder", "content"]].itertuples(index=False)]
-    return pd.concat(frames, ignore_index=True) if frames else pd.DataFrame()
+        found = [_points(*row) for rows in found for row in rows[["folder", "content"]].itertuples(index=False)]
+    return pd.concat(found, ignore_index=True) if found else pd.DataFrame()
 
 
 def _points(folder: str, content: bytes) -> pd.DataFrame:
-    frame = pd.read_parquet(BytesIO(content))
-    frame.insert(0, "folder", folder)
-    return frame
+    try:
+        rows = pd.read_parquet(BytesIO(content))
+    except (ValueError, OSError) as error:
+        raise UserError(f"{folder}: its {POINTS} is no Parquet file; archive verify says more") from error
+    rows.insert(0, "folder", folder)
+    return rows
 
 
-def _frames(part: Path) -> dict[str, pd.DataFrame]:
-    return {name: _frame(part, name) for name in FRAMES if (part / f"{name}.parquet").is_file()}
-
-
-def _frame(part: Path, name: str) -> pd.DataFrame:
-    return storage.read_parquet(part / f"{name}.parquet")
-
-
-def _check(part: Path) -> None:
-    """Hold every file of a part against its manifest.
-
-    Raises:
-        UserError: one was changed, lost or put there.
-    """
-    said = storage.read_json(part / MANIFEST)
-    if not isinstance(said, dict) or said.get("format") != FORMAT or not isinstance(said.get("files"), dict):
-        raise UserError(f"{part / MANIFEST}: not the manifest of an archive; {AGAIN}")
-    sums = said["files"]
-    for name in sorted({*sums, *(path.name for path in part.iterdir())} - {MANIFEST}):
-        path = part / name
-        if name not in sums or Path(name).name != name or name.removesuffix(".parquet") not in FRAMES:
-            raise UserError(f"{path}: no file of the archive, by its {MANIFEST}; {AGAIN}")
-        if not path.is_file():
-            raise UserError(f"{path}: lost; {AGAIN}")
-        if storage.checksum(path) != sums[name]:
-            raise UserError(f"{path}: changed since it was added; {AGAIN}")
-
-
-def summary(archive: Path) -> list[tuple[str, int, float]]:
-    """How much there is: (what, files or runs, MiB) of every stage, frame and part."""
-    runs = archived(archive).values()
+def summary(archive: Path, folders: Collection[str] | None = None) -> list[tuple[str, int, float]]:
+    """How much there is: (what, files or runs, MiB) of every stage, frame and part; ``folders``: count these runs."""
+    runs = [run for run in archived(archive).values() if _asked(run.folder, folders)]
     stages = [run.record.identity.stage for run in runs]
     rows = [(stage, stages.count(stage), 0.0) for stage in dict.fromkeys(stages)]
-    for name in (*(f"{frame}.parquet" for frame in FRAMES), MANIFEST):
-        files = list(archive.glob(f"part-*/{name}"))
+    for name in (*(f"{one}.parquet" for one in FRAMES), MANIFEST):
+        files = [file for part in parts(archive) if (file := part / name).is_file()]
         rows.append((name, len(files), sum(file.stat().st_size for file in files) / 2**20))
     return rows
