@@ -9,10 +9,14 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+PART = "part-[0-9][0-9][0-9][0-9]"
+
 
 def read(archive: Path, name: str) -> pd.DataFrame:
     """One frame over all parts; of a run that was added twice, the rows of the last part."""
-    frames = [pd.read_parquet(path).assign(part=path.parent.name) for path in sorted(archive.glob(f"*/{name}.parquet"))]
+    frames = [
+        pd.read_parquet(path).assign(part=path.parent.name) for path in sorted(archive.glob(f"{PART}/{name}.parquet"))
+    ]
     rows = pd.concat(frames, ignore_index=True)
     return rows[rows["part"] == rows.groupby("folder")["part"].transform("max")]
 

@@ -1,14 +1,17 @@
 """Runs of the archive that are drawn, made again and compared."""
 
 import shutil
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from mtcsirl import cli
 from mtcsirl.errors import UserError
-from mtcsirl.files.identity import FILE, NOTE
+from mtcsirl.files.identity import FILE, NOTE, dumps, read_record
 from mtcsirl.results import again, archive
+from mtcsirl.settings import Settings
 from mtcsirl.study.keys import identity_of
 from tests.results.small_study import IRL, SCORED, STUDY, settings, write
 
@@ -49,22 +52,110 @@ def test_what_was_not_kept_is_to_be_made_too(whole: Path) -> None:
 def test_equal_bytes_and_others(whole: Path, tmp_path: Path) -> None:
     archive.unpack(whole, tmp_path)
     known = archive.archived(whole)
-    assert again.compare(whole, known, tmp_path) == [], "restored runs were not made again"
+    assert again.compare(whole, known, tmp_path) == ((), ()), "restored runs were not made again"
     for folder, velocity in ((EXPERT, 0.7), (OTHER, 0.6)):
         shutil.rmtree(tmp_path / folder)
         write(BY_FOLDER[folder], settings(tmp_path), velocity)
-    same, other = again.compare(whole, known, tmp_path)
+    (same, other), left_out = again.compare(whole, known, tmp_path)
+    assert left_out == ()
     assert (same.folder, same.other, same.apart) == (EXPERT, (), {})
-    assert (other.folder, other.other) == (OTHER, ("curve.csv", "evaluation.csv"))
+    assert (other.folder, other.other) == (OTHER, ("curve.csv", "evaluation.csv", "gate.json"))
     assert other.apart["velocity"] == pytest.approx((0.7, 0.6), rel=0.2)
 
 
-def test_a_run_of_other_settings_is_not_compared(whole: Path, tmp_path: Path) -> None:
-    at = settings(tmp_path)
-    other = at.model_copy(update={"sac": at.sac.model_copy(update={"discount": 0.9})})
+def of_other_settings(results: Path) -> Settings:
+    at = settings(results)
+    return at.model_copy(update={"sac": at.sac.model_copy(update={"discount": 0.9})})
+
+
+def test_a_run_of_other_settings_is_listed_and_the_others_are_compared(whole: Path, tmp_path: Path) -> None:
+    write(BY_FOLDER[EXPERT], of_other_settings(tmp_path))
+    write(BY_FOLDER[OTHER], settings(tmp_path))
+    found = again.compare(whole, archive.archived(whole), tmp_path)
+    assert [one.folder for one in found.made] == [OTHER]
+    assert found.left_out == ((EXPERT, "is another run than the archive's: sac.discount: 0.97 -> 0.9"),)
+
+
+def _edit(folder: Path) -> None:
+    path = folder / "curve.csv"
+    path.write_text(path.read_text().replace("0.7", "0.8"))
+
+
+def _lose(folder: Path) -> None:
+    (folder / "policy.safetensors").unlink()
+
+
+def _lose_provenance(folder: Path) -> None:
+    (folder / "provenance.json").unlink()
+
+
+def _break(folder: Path) -> None:
+    (folder / FILE).write_text("{")
+
+
+def _lead_out(folder: Path) -> None:
+    record = read_record(folder)
+    assert record is not None
+    (folder / FILE).write_text(dumps(replace(record, files={**record.files, "../../../away.json": "0" * 64})))
+
+
+UNMADE: dict[Callable[[Path], None], str] = {
+    _edit: "curve.csv changed since its run wrote it",
+    _lose: "lacks policy.safetensors",
+    _lose_provenance: "lacks provenance.json",
+    _break: "not a readable identity",
+    _lead_out: "'../../../away.json' is no file that its stage leaves",
+}
+
+
+@pytest.mark.parametrize("damage", UNMADE)
+def test_only_whole_and_unchanged_runs_count_as_made_again(whole: Path, tmp_path: Path, damage) -> None:
+    for folder in (EXPERT, OTHER):
+        write(BY_FOLDER[folder], settings(tmp_path))
+    damage(tmp_path / EXPERT)
+    made, ((folder, why),) = again.compare(whole, archive.archived(whole), tmp_path)
+    assert [one.folder for one in made] == [OTHER]
+    assert folder == EXPERT
+    assert UNMADE[damage] in why
+
+
+def test_restored_runs_without_their_notes_were_not_made_again(whole: Path, tmp_path: Path) -> None:
+    """Neither those that lack what was not kept nor those of which everything is there."""
+    archive.unpack(whole, tmp_path)
+    for note in tmp_path.rglob(NOTE):
+        note.unlink()
+    found = again.compare(whole, archive.archived(whole), tmp_path)
+    assert found.made == ()
+    assert len(found.left_out) == len(BY_FOLDER)
+    said = dict(found.left_out)
+    assert said[EXPERT] == "was restored, not made again: its provenance.json is the archive's"
+    assert said[OTHER].startswith("lacks policy.safetensors")
+
+
+@pytest.mark.parametrize("drawn", [EXPERT, IRL.folder, STUDY.transfers[0].folder])
+def test_runs_that_cannot_be_compared_are_not_drawn(whole: Path, tmp_path: Path, drawn: str) -> None:
+    """Whether the drawn run is another or one that it comes from."""
+    known = archive.archived(whole)
+    again.refuse_others([BY_FOLDER[drawn]], known, settings(tmp_path))
+    with pytest.raises(UserError, match=r"sac\.discount: 0\.97 -> 0\.9; take the settings, scale and code"):
+        again.refuse_others([BY_FOLDER[drawn]], known, of_other_settings(tmp_path))
+
+
+def test_the_verbs_refuse_and_list_other_runs(whole: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    other = of_other_settings(tmp_path / "again")
+    words = ["--archive", str(whole), "--settings", other.model_dump_json()]
+    assert cli.main(["archive", "draw", "--agents", "1", "--irl-runs", "0", *words]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "is another run than the archive's: sac.discount: 0.97 -> 0.9" in line
+    assert not (tmp_path / "again").exists()
     write(BY_FOLDER[EXPERT], other)
-    with pytest.raises(UserError, match=f"{EXPERT}: is another run than the archive's, by settings or code"):
-        again.compare(whole, archive.archived(whole), tmp_path)
+    assert cli.main(["archive", "compare", *words]) == 2
+    said = capsys.readouterr()
+    assert f"{EXPERT}: not compared: is another run" in said.out
+    assert "no archived run was made again there" in said.err
+    write(BY_FOLDER[OTHER], settings(tmp_path / "again"))
+    assert cli.main(["archive", "compare", *words]) == 0
+    assert "1 of 1 runs have the archive's bytes; 1 not compared" in capsys.readouterr().out
 
 
 def test_the_verbs(whole: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

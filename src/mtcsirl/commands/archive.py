@@ -34,6 +34,7 @@ def register(verbs: Verbs) -> None:
     verb.add_argument("--agents", type=natural, default=12, metavar="N", help="draw: so many agents; default 12")
     verb.add_argument("--irl-runs", type=natural, default=2, metavar="N", help="draw: so many IRL runs; default 2")
     verb.add_argument("--draw-seed", type=seed, default=0, metavar="SEED", help="draw: decides which; default 0")
+    verb.add_argument("--runs", type=natural, metavar="N", help="verify: fail unless the archive holds so many runs")
     add_artefact(verb)
     add_study_settings(verb)
 
@@ -60,15 +61,29 @@ def _there(parsed: argparse.Namespace) -> Path:
 
 
 def _verify(parsed: argparse.Namespace) -> None:
-    from mtcsirl.results.archive import archived, verify
+    from mtcsirl.results.archive import archived, unverified, verify
 
-    wrong = verify(_there(parsed))
+    folders = _asked(parsed)
+    wrong = verify(_there(parsed), folders)
     for line in wrong:
         print(line)
     if wrong:
         raise UserError(f"{parsed.archive}: {len(wrong)} faults")
-    runs = len(archived(parsed.archive))
-    print(f"{parsed.archive}: {runs} runs; every kept file is what its run wrote")
+    known = archived(parsed.archive)
+    if parsed.runs is not None and len(known) != parsed.runs:
+        raise UserError(f"{parsed.archive}: {len(known)} runs, not {parsed.runs}; get the parts that are missing")
+    own = [run for folder, run in known.items() if folders is None or folder in folders]
+    of = "" if folders is None else f" of {len(folders)} of {parsed.target}"
+    print(f"{parsed.archive}: {len(own)} runs{of}; every kept file is what its run wrote")
+    for line in unverified(own):
+        print(line)
+
+
+def _asked(parsed: argparse.Namespace) -> set[str] | None:
+    """Folders of the runs of ``--target``; None without one."""
+    from mtcsirl.study.design import design
+
+    return {run.folder for run in design(study_settings(parsed), parsed.target)} if parsed.target else None
 
 
 def _unpack(parsed: argparse.Namespace) -> None:
@@ -84,21 +99,24 @@ def _unpack(parsed: argparse.Namespace) -> None:
 
 
 def _summary(parsed: argparse.Namespace) -> None:
-    from mtcsirl.results.archive import summary
+    from mtcsirl.results.archive import archived, summary
     from mtcsirl.study.design import design
 
-    planned = design(study_settings(parsed), parsed.target).jobs()
-    rows = summary(_there(parsed))
-    for what, count, mib in rows:
-        of = f"{count:5} of {planned[what]} runs" if what in planned else f"{mib:8.2f} MiB in {count} parts"
+    study = design(study_settings(parsed), parsed.target)
+    planned, folders = study.jobs(), {run.folder for run in study}
+    rows = summary(_there(parsed), folders)
+    for what, number, mib in rows:
+        of = f"{number:5} of {planned[what]} runs" if what in planned else f"{mib:8.2f} MiB in {number} parts"
         print(f"{what:24}{of}")
+    if others := set(archived(parsed.archive)) - folders:
+        print(f"{'other runs':24}{len(others):5}")
     print(f"{'in all':24}{sum(mib for *_, mib in rows):8.2f} MiB")
 
 
 def _draw(parsed: argparse.Namespace) -> None:
     """Restore all but some runs and what they read that was not kept; print what to ask snakemake for."""
     from mtcsirl.files.identity import marker
-    from mtcsirl.results.again import draw, to_be_made
+    from mtcsirl.results.again import draw, refuse_others, to_be_made
     from mtcsirl.results.archive import archived, unpack
     from mtcsirl.study.design import design
     from mtcsirl.study.keys import identity_of
@@ -107,6 +125,7 @@ def _draw(parsed: argparse.Namespace) -> None:
     results, study = Path(settings.results), design(settings, parsed.target)
     known = archived(_there(parsed))
     drawn = draw(known, study, parsed.agents, parsed.irl_runs, parsed.draw_seed)
+    refuse_others(drawn, known, settings)
     made = to_be_made(drawn, known)
     if there := [folder for folder in sorted(made) if (results / folder).exists()]:
         raise UserError(f"{results / there[0]}: is there; choose a folder without it: --set results=FOLDER")
@@ -122,14 +141,17 @@ def _compare(parsed: argparse.Namespace) -> None:
 
     results = Path(study_settings(parsed).results)
     found = compare(_there(parsed), archived(parsed.archive), results)
-    if not found:
+    for folder, why in found.left_out:
+        print(f"{folder}: not compared: {why}")
+    if not found.made:
         raise UserError(f"{results}: no archived run was made again there; archive draw says what to make")
-    for one in found:
+    for one in found.made:
         same = f"{one.files - len(one.other)} of {one.files} files equal"
         apart = ", ".join(f"{name} {there:.3g} -> {here:.3g}" for name, (there, here) in one.apart.items())
         print(f"{one.folder}: {same}{'; ' if one.other else ''}{apart or ', '.join(one.other)}")
-    equal = sum(not one.other for one in found)
-    print(f"{equal} of {len(found)} runs have the archive's bytes")
+    equal = sum(not one.other for one in found.made)
+    rest = f"; {len(found.left_out)} not compared" if found.left_out else ""
+    print(f"{equal} of {len(found.made)} runs have the archive's bytes{rest}")
 
 
 ACTIONS = {

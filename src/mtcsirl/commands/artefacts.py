@@ -233,16 +233,15 @@ def _judged(settings: Settings, partial: bool) -> "list[Finding]":
 
 
 def _results(parsed: argparse.Namespace) -> None:
-    from mtcsirl.files.provenance import commit, machine
     from mtcsirl.files.storage import write_text
-    from mtcsirl.report.results_page import results_page
+    from mtcsirl.report.results_page import made_with, results_page
     from mtcsirl.results.rows import evaluation_rows
     from mtcsirl.tables import TABLES
 
     settings = study_settings(parsed)
     rows = {name: evaluation_rows(design(settings, name), settings, partial=parsed.partial) for name in TABLES}
     tables = {name: table(rows[name], settings) for name, table in TABLES.items()}
-    made = {"commit": commit(), **machine()}
+    made = made_with(design(settings), settings)
     page = (parsed.output or Path("docs")) / "results.md"
     write_text(page, results_page(_judged(settings, parsed.partial), tables, settings, provenance=made))
     print(page)

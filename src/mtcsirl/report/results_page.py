@@ -3,14 +3,20 @@
 What has not been run is named in one line, not spelled out.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 from mtcsirl.claims.claims import NEVER_RUN, Finding, claims_markdown
+from mtcsirl.files import storage
 from mtcsirl.results.notes import deviation_notes, of_kind, study_note
 from mtcsirl.settings import Settings
+from mtcsirl.study.runs import AnyRun
+from mtcsirl.study.standing import DONE, standing
 from mtcsirl.tables.table import Table
 
+MACHINE = ("processor", "cores", "openblas", "system", "python")
+"""What the page says of the machines, beside the commit."""
 HEAD = """\
 # Results
 
@@ -18,6 +24,30 @@ Written by `{command}`; edit nothing here. {scale}.
 The paper's numbers stand beside ours; how each claim was judged stands in
 [the criteria](../src/mtcsirl/claims/claims.yaml).
 """
+
+
+def made_with(study: Iterable[AnyRun], settings: Settings) -> dict[str, str]:
+    """Commits and machines of the runs that are done, by their provenance: each value once, a dash without a run.
+
+    Raises:
+        UserError: the provenance of a run is lost or unreadable.
+    """
+    done = [run for run in study if standing(run, settings).state == DONE]
+    read = [storage.read_json(Path(settings.results) / run.folder / "provenance.json") for run in done]
+    found: dict[str, list[str]] = {name: [] for name in ("commit", *MACHINE)}
+    for said in read:
+        for name, values in found.items():
+            values.append(_cell(said if name == "commit" else _of(said, "machine"), name))
+    return {name: ", ".join(dict.fromkeys(values)) or "–" for name, values in found.items()}
+
+
+def _of(said: Any, name: str) -> Any:
+    return said.get(name) if isinstance(said, Mapping) else None
+
+
+def _cell(said: Any, name: str) -> str:
+    value = _of(said, name)
+    return "unknown" if value is None else " ".join(str(value).replace("|", "/").split())
 
 
 def results_page(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -11,10 +11,13 @@ import pandas as pd
 
 from mtcsirl.episodes.gates import stochastic_means
 from mtcsirl.errors import UserError
-from mtcsirl.files.identity import NOTE, read_record
+from mtcsirl.files.identity import FILE, NOTE, Identity, Record, checksum, differences, read_record
 from mtcsirl.files.storage import read_csv
 from mtcsirl.results.archive import Archived, read
-from mtcsirl.study.keys import Run
+from mtcsirl.results.packing import PROVENANCE
+from mtcsirl.results.soundness import foreign
+from mtcsirl.settings import Settings
+from mtcsirl.study.keys import Run, identity_of
 from mtcsirl.study.runs import AnyRun, Runs
 
 AGENTS, IRL_RUNS = ("train_expert", "train_sac", "transfer"), ("learn_reward",)
@@ -60,6 +63,36 @@ def to_be_made(drawn: Iterable[AnyRun], known: Mapping[str, Archived]) -> set[st
     return found
 
 
+def refuse_others(drawn: Iterable[AnyRun], known: Mapping[str, Archived], settings: Settings) -> None:
+    """Hold the drawn runs and what they come from against the archive, before anything is made.
+
+    Raises:
+        UserError: under ``settings`` and with this code one of them is another run.
+    """
+    for run in _from_the_first(drawn):
+        if run.folder in known:
+            why = _another(known[run.folder].record.identity, identity_of(run, settings))
+            if why:
+                raise UserError(
+                    f"{run.folder}: {why}; take the settings, scale and code that the archive was made with"
+                )
+
+
+def _from_the_first(drawn: Iterable[AnyRun]) -> Iterator[Run[Any]]:
+    """Each run after those that it needs, so that the first difference is not that of an input."""
+    for run in drawn:
+        yield from _from_the_first(run.needs.values())  # type: ignore[arg-type]
+        yield run
+
+
+def _another(archived: Identity, other: Identity) -> str:
+    """The first difference between two runs; empty if there is none."""
+    if archived.hash == other.hash:
+        return ""
+    first = next(differences(archived, other), f"identity: {archived.hash} -> {other.hash}")
+    return f"is another run than the archive's: {first}"
+
+
 class Again(NamedTuple):
     """A run that was made again, beside the archived one."""
 
@@ -72,26 +105,54 @@ class Again(NamedTuple):
     """Of an agent with other bytes: means over stochastic episodes, archived and made again, by metric."""
 
 
-def compare(archive: Path, known: Mapping[str, Archived], results: Path) -> list[Again]:
-    """Every archived run that was made again below ``results``; restored ones are none.
+class Comparison(NamedTuple):
+    """Archived runs that were made again, and those that stand there and cannot be compared: folder and why."""
 
-    Raises:
-        UserError: a run there is of another identity: other settings or code.
-    """
+    made: tuple[Again, ...]
+    left_out: tuple[tuple[str, str], ...]
+
+
+def compare(archive: Path, known: Mapping[str, Archived], results: Path) -> Comparison:
+    """Every archived run that was made again below ``results``, whole and unchanged; restored ones are none."""
     others: dict[str, tuple[str, ...]] = {}
+    left_out: list[tuple[str, str]] = []
     for folder, run in sorted(known.items()):
-        record = None if (results / folder / NOTE).is_file() else read_record(results / folder)
-        if record is None:
+        if (results / folder / NOTE).is_file() or not (results / folder / FILE).is_file():
             continue
-        if record.identity.hash != run.record.identity.hash:
-            raise UserError(f"{results / folder}: is another run than the archive's, by settings or code")
+        try:
+            record = _made_again(results / folder, run)
+        except UserError as error:
+            left_out.append((folder, str(error)))
+            continue
         others[folder] = tuple(name for name, sha in run.record.files.items() if record.files.get(name) != sha)
     rows = read(archive, "evaluation") if any(EVALUATION in other for other in others.values()) else pd.DataFrame()
     found = []
     for folder, other in others.items():
         apart = _apart(rows[rows["folder"] == folder], results / folder) if EVALUATION in other else {}
         found.append(Again(folder, len(known[folder].record.files), other, apart))
-    return found
+    return Comparison(tuple(found), tuple(left_out))
+
+
+def _made_again(folder: Path, run: Archived) -> Record:
+    """The record in ``folder``, whose files are what it says.
+
+    Raises:
+        UserError: it is another run, not whole, was edited, or is the archive's own.
+    """
+    record = read_record(folder)
+    assert record is not None
+    if why := _another(run.record.identity, record.identity):
+        raise UserError(why)
+    if strange := foreign(record):
+        raise UserError(f"{strange[0]!r} is no file that its stage leaves")
+    for name in (*record.files, PROVENANCE):
+        if not (folder / name).is_file():
+            raise UserError(f"lacks {name}, so that it is not whole or was restored without its note {NOTE}")
+        if name in record.files and checksum(folder / name) != record.files[name]:
+            raise UserError(f"{name} changed since its run wrote it")
+    if checksum(folder / PROVENANCE) == run.provenance:
+        raise UserError(f"was restored, not made again: its {PROVENANCE} is the archive's")
+    return record
 
 
 def _apart(rows: pd.DataFrame, folder: Path) -> dict[str, tuple[float, float]]:

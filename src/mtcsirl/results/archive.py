@@ -22,7 +22,20 @@ import pandas as pd
 from mtcsirl.errors import UserError
 from mtcsirl.files import storage
 from mtcsirl.files.identity import FILE, NOTE, Record, lost, note, parse_record, read_record, result_files
-from mtcsirl.results.packing import BLOBS, FRAMES, INDEX, POINTS, PROVENANCE, TEXTS, Frames, by_folder, kept, packed
+from mtcsirl.results.packing import (
+    BLOBS,
+    EVERY,
+    FRAMES,
+    INDEX,
+    POINTS,
+    PROVENANCE,
+    TEXTS,
+    THINNED,
+    Frames,
+    by_folder,
+    kept,
+    packed,
+)
 from mtcsirl.results.parts import AGAIN, FORMAT, MANIFEST, check, frame, frames, number_of, strangers
 from mtcsirl.results.parts import parts as parts
 from mtcsirl.results.soundness import Told, faults_of_inputs, faults_of_run, files_of, foreign
@@ -75,8 +88,11 @@ def _of_part(part: Path) -> Iterator[Archived]:
     texts, index = frame(part, TEXTS), frame(part, INDEX)
     names = index[index["kept"]].groupby("folder", observed=True)["file"].agg(frozenset).to_dict()
     provenance = index[index["file"] == PROVENANCE].groupby("folder", observed=True)["sha256"].last().to_dict()
-    for folder, text in texts.loc[texts["file"] == FILE, ["folder", "content"]].itertuples(index=False):
-        record = parse_record(text, f"{part}: {folder}", AGAIN)
+    identities = texts.loc[texts["file"] == FILE, ["folder", "content"]]
+    for folder in sorted({*index["folder"], *texts["folder"]} - set(identities["folder"])):
+        raise UserError(f"{part}: {folder!r} lacks its {FILE}; {AGAIN}")
+    for folder, text in identities.itertuples(index=False):
+        record = parse_record(text, f"{part}: {folder!r}", AGAIN)
         own = names.get(folder, frozenset()) & frozenset(record.files)
         yield Archived(folder, part.name, record, own, provenance.get(folder, ""))
 
@@ -132,9 +148,9 @@ def _write(draft: Path, results: Path, folders: Iterable[str], with_policies: Co
     for folder in folders:
         for name, own in packed(results / folder, folder, _whole(results / folder), folder in with_policies):
             rows[name].append(own)
-    for name, own in rows.items():
-        if own:
-            storage.write_parquet(draft / f"{name}.parquet", pd.concat(own, ignore_index=True), level=LEVEL)
+    for name, several in rows.items():
+        if several:
+            storage.write_parquet(draft / f"{name}.parquet", pd.concat(several, ignore_index=True), level=LEVEL)
     sums = {path.name: storage.checksum(path) for path in sorted(draft.glob("*.parquet"))}
     storage.write_json(draft / MANIFEST, {"format": FORMAT, "files": sums})
 
@@ -199,6 +215,20 @@ def verify(archive: Path, folders: Collection[str] | None = None) -> list[str]:
         told = (Told(run.folder, run.record.identity, run.record.read, run.record.bytes) for run in known)
         wrong += [f"{archive}: {fault}" for folder, fault in faults_of_inputs(told) if _asked(folder, folders)]
     return wrong
+
+
+def unverified(runs: Iterable[Archived]) -> list[str]:
+    """What the archive holds of these runs that nothing can be held against, one line each."""
+    stages = [run.record.identity.stage for run in runs]
+    thinned, shown = stages.count("learn_reward"), stages.count("collect_demonstrations")
+    lines = (
+        (thinned, f"nothing holds: the rows of {thinned} {THINNED}, of which every {EVERY}th iteration is kept"),
+        (
+            shown,
+            f"nothing holds: success and metric in the gates of {shown} demonstrations, whose episodes are not kept",
+        ),
+    )
+    return [line for number, line in lines if number]
 
 
 def _asked(folder: str, folders: Collection[str] | None) -> bool:

@@ -6,7 +6,7 @@ Nothing in a part is trusted: whoever can edit a frame can redo the manifest, to
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +21,7 @@ MANIFEST = "manifest.json"
 FORMAT = "mtcsirl archive 1"
 AGAIN = "get this part again from where the archive came from"
 PART = re.compile(r"part-\d{4}", re.ASCII)
-COLUMNS = {
+COLUMNS: Mapping[str, Mapping[str, type]] = {
     INDEX: {"folder": str, "file": str, "sha256": str, "kept": bool, "columns": str},
     TEXTS: {"folder": str, "file": str, "content": str},
     WEIGHTS: {"folder": str, "file": str, "exponents": bytes, "rest": bytes},
@@ -118,7 +118,7 @@ def frame(part: Path, name: str) -> pd.DataFrame:
 
 
 def _faults_of_columns(name: str, rows: pd.DataFrame) -> Iterator[str]:
-    wanted = COLUMNS.get(name, {"folder": str})
+    wanted: Mapping[str, type] = COLUMNS.get(name, {"folder": str})
     for column, kind in wanted.items():
         if column not in rows.columns:
             yield f"lacks the column {column}"

@@ -50,7 +50,7 @@ def foreign(record: Record) -> list[str]:
 
 
 def files_of(own: Frames) -> dict[str, bytes]:
-    """The kept files of a run; none where its rows are no archive's."""
+    """The kept files of a run; none where its rows do not make files."""
     try:
         return unpacked(own)
     except (KeyError, ValueError, TypeError, AttributeError):
@@ -81,7 +81,8 @@ def _faults_of_place(folder: str, own: Frames, files: Mapping[str, bytes]) -> It
         yield f"{folder!r}: no folder below the results"
         return
     if INDEX not in own or FILE not in files:
-        yield f"{folder}: no rows of an archive (they lack its {FILE if INDEX in own else INDEX})"
+        why = f"lack its {FILE if INDEX in own else INDEX}" if files else "do not make files"
+        yield f"{folder}: no rows of an archive (they {why})"
         return
     try:
         record = _record(folder, files)
@@ -99,13 +100,13 @@ def _faults_of_rows(folder: str, own: Frames, files: Mapping[str, bytes]) -> Ite
     for frame in (INDEX, TEXTS, WEIGHTS, BLOBS):
         if frame in own and own[frame]["file"].duplicated().any():
             yield f"{folder}: a file stands twice in {frame}"
-    columns = dict(own[INDEX][["file", "columns"]].itertuples(index=False))
+    columns = {row["file"]: row["columns"].split(",") for row in own[INDEX].to_dict("records")}
     for name, frame in TIDY.items():
         if name not in columns and frame in own:
             yield f"{folder}: rows in {frame} of a file {name} that it does not have"
         elif frame in own:
-            others = own[frame].drop(columns=columns[name].split(","), errors="ignore")
-            if others.notna().any(axis=None):
+            others = [column for column in own[frame].columns if column not in columns[name]]
+            if own[frame][others].notna().to_numpy().any():
                 yield f"{folder}: columns in {frame} that {name} does not have"
 
 

@@ -64,8 +64,9 @@ def _verdict(stage: str, said: Any, rows: pd.DataFrame | None, cs_reward: str, l
 def _of_generators(rows: pd.DataFrame, cs_reward: str, limits: GateSettings) -> dict[str, Any]:
     """As an IRL run sums its generators up: it passes if every generator does."""
     members = [
-        {"task": task, "target": int(target)} | gate_verdict("generator", _means(own), cs_reward, limits)
-        for (task, target), own in rows.groupby(["task", "target"], sort=False)
+        {"task": own["task"].iloc[0], "target": int(own["target"].iloc[0])}
+        | gate_verdict("generator", _means(own), cs_reward, limits)
+        for _, own in rows.groupby(["task", "target"], sort=False)
     ]
     return {
         "gate": "generator",
