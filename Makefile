@@ -45,7 +45,7 @@ reference: setup  ## from the committed archive, without training: every table, 
 	@{ $(COMMITTED); } > /dev/null 2>&1 \
 	    || { echo "make reference: git names no committed figure to compare with; clone the repository with git" >&2; exit 1; }
 	@gone=$$(git ls-files --deleted results/reference paper_figs) && [ -z "$$gone" ] \
-	    || { echo "make reference: lost:" $$gone "(git checkout brings them back)" >&2; exit 1; }
+	    || { echo "make reference: lost:" $$gone "(git checkout brings it back)" >&2; exit 1; }
 	mtcsirl archive verify --archive $(ARCHIVE) --runs $(RUNS)
 	rm -rf $(REFERENCE)
 	mtcsirl archive unpack --archive $(ARCHIVE) $(WITHIN)

@@ -76,12 +76,11 @@ def _record(folder: str, files: Mapping[str, bytes]) -> Record:
 
 def _faults_of_place(folder: str, own: Frames, files: Mapping[str, bytes]) -> Iterator[str]:
     """The folder is one below the results, there is a record, and every name is one that its stage leaves."""
-    path = PurePosixPath(folder)
-    if path.is_absolute() or str(path) != folder or {"..", "."} & set(path.parts) or not folder.isprintable():
+    if _leads_out(folder):
         yield f"{folder!r}: no folder below the results"
         return
     if INDEX not in own or FILE not in files:
-        why = f"lack its {FILE if INDEX in own else INDEX}" if files else "do not make files"
+        why = f"lack its {INDEX}" if INDEX not in own else f"lack its {FILE}" if files else "do not make files"
         yield f"{folder}: no rows of an archive (they {why})"
         return
     try:
@@ -93,6 +92,13 @@ def _faults_of_place(folder: str, own: Frames, files: Mapping[str, bytes]) -> It
     for name in sorted({*said, *record.files}):
         if not leaves(record.identity.stage, name) and (name not in (FILE, PROVENANCE) or name in record.files):
             yield f"{folder}: {name!r} is no file that a run of {record.identity.stage!r} leaves"
+
+
+def _leads_out(folder: str) -> bool:
+    """Whether a folder may lie elsewhere than below the results, or cannot be shown in a line."""
+    path = PurePosixPath(folder)
+    plain = str(path) == folder and folder.isprintable() and not path.is_absolute()
+    return not plain or not path.parts or ".." in path.parts
 
 
 def _faults_of_rows(folder: str, own: Frames, files: Mapping[str, bytes]) -> Iterator[str]:
