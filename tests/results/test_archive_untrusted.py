@@ -16,11 +16,14 @@ import pandas as pd
 import pytest
 
 from mtcsirl import cli
+from mtcsirl.episodes.evaluation import metrics
 from mtcsirl.errors import UserError
 from mtcsirl.files import storage
 from mtcsirl.files.identity import FILE, digest_of, dumps, parse_record, read_record
-from mtcsirl.results import archive
+from mtcsirl.results import archive, verdicts
+from mtcsirl.results.packing import by_folder
 from mtcsirl.results.soundness import leaves
+from mtcsirl.results.verdicts import faults_of_gate
 from mtcsirl.study.outputs import OUTPUTS
 from tests.conftest import CHECKOUT
 from tests.results.small_study import IRL, SHOWN, STUDY, add, settings, write
@@ -168,6 +171,16 @@ def test_add_reads_nothing_outside_the_folder_of_a_run(made, tmp_path, name):
     assert not list((tmp_path / "archive").iterdir())
 
 
+@pytest.mark.parametrize("name", ["settings.json", "gate.json"])
+def test_a_run_without_one_of_its_files_is_refused(copy, tmp_path, name):
+    record = parse_record(text_of(copy, EXPERT, FILE), EXPERT)
+    files = {one: sha for one, sha in record.files.items() if one != name}
+    _text(copy, EXPERT, FILE, dumps(replace(record, files=files)))
+    for frame in ("texts", "files"):
+        edit(copy, frame, lambda rows: rows[(rows["folder"] != EXPERT) | (rows["file"] != name)])
+    refused(copy, f"{EXPERT}/{name}: not in files", tmp_path / "out")
+
+
 # --- numbers that were edited -----------------------------------------------------------------------------------------
 
 
@@ -268,6 +281,18 @@ def test_a_gate_that_does_not_follow_from_the_episodes_is_refused(copy, tmp_path
     put(copy, folder, "gate.json", json.dumps(gate, indent=2, sort_keys=True) + "\n")
     refused(copy, f"{folder}/gate.json: ", tmp_path / "out")
     assert len(archive.verify(copy)) == 1
+
+
+def test_a_gate_of_an_extension_that_is_not_loaded_is_passed_over(copy, monkeypatch):
+    """Its metrics are not measured, or one more is; a metric of every study may not be missing."""
+    part = archive.frames(copy / "part-0001")
+    files, rows = archive.files_of(by_folder(part)[EXPERT]), by_folder(part)[EXPERT]["evaluation"]
+    identity = parse_record(files[FILE].decode(), EXPERT).identity
+    other = replace(identity, key={**identity.key, "cs_reward": "of_an_extension"})
+    assert list(faults_of_gate(other, files, rows)) == []
+    monkeypatch.setattr(verdicts, "metrics", lambda: (*metrics(), "of_an_extension"))
+    assert list(faults_of_gate(identity, files, rows)) == []
+    assert list(faults_of_gate(identity, files, rows[rows["metric"] != "success"])) != []
 
 
 @pytest.mark.parametrize("content", ["[]", "7", "{}", "{", "[" * 100_000, '{"gate": "expert"}', '{"success": "x"}'])

@@ -119,7 +119,8 @@ def _faults_of_rows(folder: str, own: Frames, files: Mapping[str, bytes]) -> Ite
 def _faults_of_bytes(folder: str, own: Frames, files: Mapping[str, bytes]) -> Iterator[str]:
     """Every file is what its run wrote, and kept where an archive keeps it."""
     record, index = _record(folder, files), own[INDEX].set_index("file")
-    for name in sorted({*index.index, *record.files, *files, FILE, PROVENANCE}):
+    outputs = OUTPUTS.get(record.identity.stage, ())
+    for name in sorted({*index.index, *record.files, *files, *outputs, FILE, PROVENANCE}):
         if name not in index.index:
             yield f"{folder}/{name}: not in {INDEX}"
             continue

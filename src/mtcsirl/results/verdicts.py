@@ -13,12 +13,14 @@ from pydantic import ValidationError
 from mtcsirl.episodes.evaluation import metrics
 from mtcsirl.episodes.gates import gate_verdict, stochastic_means
 from mtcsirl.files.identity import Identity
-from mtcsirl.names import DIVERGED
+from mtcsirl.names import DIVERGED, KEPT
 from mtcsirl.rewards.ground_truth import COMMON_SENSE_REWARDS
 from mtcsirl.settings import GateSettings
 
 GATE_OF = {"train_expert": "expert", "train_sac": "sac", "transfer": "sac"}
 """Of the stages with one agent."""
+OF_EVERY_STUDY = {"success", "velocity", "action_norm", "task_reward", DIVERGED}
+"""Metrics that need no extension."""
 DIGITS = 1e-6
 """Rows have nine significant digits, and a gate was made from all of them."""
 
@@ -44,8 +46,11 @@ def faults_of_gate(identity: Identity, files: Mapping[str, bytes], rows: pd.Data
 
 
 def _measured(rows: pd.DataFrame, cs_reward: str) -> bool:
-    """Whether what is registered today is what was registered then; an extension may be missing."""
-    return set(metrics()) <= set(rows["metric"]) and (not cs_reward or cs_reward in COMMON_SENSE_REWARDS)
+    """Whether what extensions measure today was measured then, too, and the cs-reward is one of today's."""
+    missing = set(metrics()) - set(rows["metric"])
+    if cs_reward and cs_reward not in COMMON_SENSE_REWARDS:
+        return False
+    return not missing or bool(missing & OF_EVERY_STUDY)
 
 
 def _verdict(stage: str, said: Any, rows: pd.DataFrame | None, cs_reward: str, limits: GateSettings) -> dict[str, Any]:
@@ -80,6 +85,9 @@ def _of_generators(rows: pd.DataFrame, cs_reward: str, limits: GateSettings) -> 
 
 
 def _means(rows: pd.DataFrame) -> dict[str, float]:
+    judged = rows[(rows["policy"] == "stochastic") & (rows["kept"] == KEPT)]
+    if OF_EVERY_STUDY - set(judged["metric"]):
+        raise ValueError("the episodes that are judged lack a metric")
     return stochastic_means(rows.to_dict("records"))  # type: ignore[arg-type]
 
 
