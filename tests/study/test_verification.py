@@ -62,6 +62,31 @@ def test_what_is_wrong_is_named(results: Path, capsys: pytest.CaptureFixture[str
     assert printed.err.count("\n") == 1
 
 
+NO_RUN = {
+    "nothing": [],
+    "sources": ["cli.py", "deep/module.py"],
+    "settings of an editor": [".vscode/settings.json"],
+    "somebody's identity": ["identity.json", "thesis.tex"],
+    "a temporary of somebody": [".draft.tmp"],
+}
+
+
+@pytest.mark.parametrize("what", NO_RUN)
+def test_where_no_run_is_nothing_is_said_to_be_whole(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], what: str
+) -> None:
+    for name in NO_RUN[what]:
+        storage.write_text(tmp_path / name, "{}")
+    assert cli.main(["verify", str(tmp_path)]) == 2
+    printed = capsys.readouterr()
+    assert printed.out == ""
+    assert printed.err == f"mtcsirl: {tmp_path}: holds no run; name the results folder of a study, or of one run\n"
+
+
+def test_one_run_alone_can_be_verified(results: Path) -> None:
+    assert cli.main(["verify", str(results / "sac/reach-t0/s0")]) == 0
+
+
 def test_no_such_folder_is_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["verify", str(tmp_path / "none")]) == 2
     assert capsys.readouterr().err.count("\n") == 1

@@ -18,7 +18,7 @@ from mtcsirl.settings.strict import StrictError, parse_json
 from mtcsirl.settings.unread import refuse, unread
 from mtcsirl.study.ablations import ABLATIONS
 from mtcsirl.study.design import ARTEFACTS
-from mtcsirl.study.outputs import OUTPUTS
+from mtcsirl.study.folders import check_folder
 
 Model = TypeVar("Model", bound=BaseModel)
 Verbs = Any
@@ -242,7 +242,7 @@ def run_settings(
     """The settings of one run: ``--settings``, else what the configuration says; then ``--set``.
 
     With ``stage`` the run itself is looked at before it starts: that it reads every key that was set, that this machine
-    can do it, that ``--output`` holds no other kind of run.
+    can do it, that ``--output`` holds nothing else.
     """
     if parsed.settings:
         data = _mapping(parsed.settings)
@@ -252,21 +252,12 @@ def run_settings(
     if stage:
         key = {name: getattr(parsed, name, "") for name in ("cs_reward", "method")}
         refuse(settings, unread(stage, **key), key["method"] or stage.replace("_", "-"))
-        refuse_folder_of_others(parsed.output, stage)
+        check_folder(parsed.output, stage)
     if stage and isinstance(settings, AgentRunSettings):
         check_agent(settings)
     if stage and isinstance(settings, IrlRunSettings):
         check_irl(settings, len(parsed.demonstrations))
     return settings
-
-
-def refuse_folder_of_others(folder: Path, stage: str = "") -> None:
-    """Raise UserError where ``folder`` holds files of a run that ``stage`` would not leave (no stage: any run's)."""
-    own = {*OUTPUTS.get(stage, ("evaluation.csv",)), "settings.json", "provenance.json"}
-    others = {name for names in OUTPUTS.values() for name in names} - (own if stage else {"evaluation.csv"})
-    found = sorted(name for name in others if (folder / name).exists())
-    if found:
-        raise UserError(f"{folder}: holds another run ({found[0]}); choose a folder of its own")
 
 
 def check_experiment(asked: str | None, found: str, members: Sequence[tuple[str, int]]) -> None:

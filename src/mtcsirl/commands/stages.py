@@ -17,12 +17,12 @@ from mtcsirl.commands.arguments import (
     check_experiment,
     method,
     path,
-    refuse_folder_of_others,
     run_settings,
     seed,
 )
 from mtcsirl.errors import UserError
 from mtcsirl.names import EXPERIMENTS
+from mtcsirl.study.folders import check_without_run
 
 AGENT_FILES = "policy.safetensors/.json, curve.csv, evaluation.csv, gate.json, settings.json, provenance.json"
 
@@ -223,7 +223,7 @@ def _evaluate(verbs: Verbs) -> None:
         from mtcsirl.files.storage import write_csv
         from mtcsirl.settings.runs import AgentRunSettings, baseline_run
 
-        refuse_folder_of_others(parsed.output)
+        check_without_run(parsed.output, "evaluation.csv")
         settings = run_settings(parsed, AgentRunSettings, lambda s: baseline_run(s, parsed.task))
         policy = load_policy(parsed.policy)
         rows = evaluate(policy, parsed.task, parsed.target, parsed.cs_reward, parsed.seed, settings)

@@ -21,11 +21,11 @@ from mtcsirl.files.identity import (
     dumps,
     lost,
     read_record,
-    result_files,
     write_marker,
 )
 from mtcsirl.files.provenance import Stopwatch, write_provenance
 from mtcsirl.settings.base import Frozen
+from mtcsirl.study import folders
 
 CHECKPOINT = "checkpoint.safetensors"
 _LOG = logging.getLogger(__name__)
@@ -74,11 +74,13 @@ def running(task: Task) -> Iterator[Stopwatch | None]:
     finished run of the same identity is there already, else the watch that measures its cost.
     """
     planned(task)
+    folders.check_folder(task.output, task.identity.stage, task.identity.key)
     with storage.locked(task.output, wait=True):
         stopwatch = Stopwatch()
         if finished(task):
             _LOG.info("%s: already there, made from the same", task.output)
             write_marker(task.output, task.identity.hash)
+            storage.remove(task.output / CHECKPOINT)  # of a run that was killed in its last moment
             yield None
             return
         begin(task)
@@ -106,7 +108,14 @@ def finished(task: Task) -> bool:
 
 
 def begin(task: Task) -> None:
-    """Take the signature off what will be overwritten."""
+    """Take the signature off what will be overwritten.
+
+    Raises:
+        UserError: the folder holds another run, or what is of no run.
+    """
+    run = folders.Named(task.identity.stage, task.identity.key)
+    folders.check_folder(task.output, *run)
+    folders.begin(task.output, run)
     storage.remove(task.output / FILE)
     storage.remove(task.output / NOTE)
     write_marker(task.output, None)
@@ -119,7 +128,8 @@ def sign(task: Task, stopwatch: Stopwatch, *, agents: int = 1, lockstep: Sequenc
     """
     storage.write_json(task.output / "settings.json", task.settings.model_dump(mode="json"))
     write_provenance(task.output, stopwatch, task.files, agents=agents, lockstep=lockstep)
-    left = checksums(task.output, result_files(task.output))
+    left = checksums(task.output, folders.results_of(task.output, task.identity.stage))
+    storage.remove(task.output / folders.BEGUN)
     storage.write_text(task.output / FILE, dumps(Record(task.identity, left, task.read)))
     write_marker(task.output, task.identity.hash)
     storage.remove(task.output / CHECKPOINT)

@@ -20,4 +20,6 @@ OUTPUTS: dict[str, tuple[str, ...]] = {
     "transfer": _AGENT,
     "score_reward": ("scores.csv", "points.parquet", *_RUN),
 }
-"""Files per stage. An IRL run also leaves the policies of its generators, one pair of files per (task, target)."""
+"""Files per stage."""
+FOLDERS: dict[str, tuple[str, ...]] = {"learn_reward": ("policies/",)}
+"""Folders per stage: an IRL run leaves the policies of its generators, one pair of files per (task, target)."""

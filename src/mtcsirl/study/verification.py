@@ -1,14 +1,17 @@
 """Is every file of a results folder what its run wrote? `mtcsirl verify` says what to delete."""
 
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 from mtcsirl.errors import UserError
 from mtcsirl.files.identity import FILE, NOT_RESULTS, Record, checksum, lost, read_record, result_files
+from mtcsirl.study.folders import holds_run, left_traces
 
 KEPT_APART = ("logs", "artefacts", ".snakemake")
 """Folders below the results that hold no runs."""
+_TEMPORARY = re.compile(r"\..+\.\d+\.tmp")
 
 
 @dataclass(frozen=True)
@@ -23,19 +26,27 @@ def faults(results: Path) -> Iterator[Fault]:
     """Everything below ``results`` that is damaged, lost, unsigned or left behind.
 
     Raises:
-        UserError: there is no such folder.
+        UserError: there is no such folder, or no run in it.
     """
     if not results.is_dir():
         raise UserError(f"{results}: no such folder")
-    signed: set[Path] = set()
-    for path in sorted(results.rglob(FILE)):
-        signed.add(path.parent)
-        yield from _of_folder(path.parent)
-    for path in sorted(results.rglob("settings.json")):
-        if path.parent not in signed and not _apart(path, results):
-            yield Fault(path.parent, f"holds results without {FILE}: its run never ended, or they come from elsewhere")
-    for path in sorted(results.rglob(".*.tmp")):
+    signed = {path.parent for path in results.rglob(FILE) if _is_ours(path.parent)}
+    begun = {path.parent for path in results.rglob("settings.json") if not _apart(path, results)} - signed
+    unsigned = {folder for folder in begun if holds_run(folder)}
+    left = sorted(path for path in results.rglob(".*.tmp") if _TEMPORARY.fullmatch(path.name))
+    if not (signed or unsigned or left):
+        raise UserError(f"{results}: holds no run; name the results folder of a study, or of one run")
+    for folder in sorted(signed):
+        yield from _of_folder(folder)
+    for folder in sorted(unsigned):
+        yield Fault(folder, f"holds results without {FILE}: its run never ended, or they come from elsewhere")
+    for path in left:
         yield Fault(path, "left by a writer that was killed")
+
+
+def _is_ours(folder: Path) -> bool:
+    """Whether the record in ``folder`` is a run's or an artefact's, damaged perhaps, and nobody else's file."""
+    return left_traces(folder) or (folder / "provenance.json").is_file() or folder.parent.name == "artefacts"
 
 
 def _of_folder(folder: Path) -> Iterator[Fault]:
@@ -49,7 +60,7 @@ def _of_folder(folder: Path) -> Iterator[Fault]:
     if folder.parent.name != "artefacts":
         foreign = set(result_files(folder)) - set(record.files) - set(NOT_RESULTS)
         for name in sorted(foreign):
-            yield Fault(folder / name, "no file of its run")
+            yield Fault(folder / name, "no file of its run; if it is yours, keep it elsewhere")
 
 
 def _changed(folder: Path, record: Record) -> Iterator[Fault]:
