@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from mtcsirl.claims.claims import judge, load_criteria
 from mtcsirl.cli import main
 from mtcsirl.figures.claims import VERDICT_COLOURS, caption, claims_figure
-from mtcsirl.files.storage import read_json, read_text, write_json
+from mtcsirl.files.storage import read_json, read_text, write_json, write_text
 from mtcsirl.report.results_page import results_page
 from mtcsirl.results.rows import evaluation_rows
 from mtcsirl.results.statistics import Estimate
@@ -200,3 +200,15 @@ def test_verbs_work_on_partial_and_refuse_missing_results(tmp_path, capsys):
     assert (tmp_path / "out" / "claims.png").stat().st_size > 1000
     assert main(["results", "--partial", *settings, *output]) == 0
     assert "## Which claims hold" in read_text(tmp_path / "out" / "results.md")
+
+
+def test_the_page_lands_in_the_studys_folder_and_not_in_somebodys_docs(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    write_text(tmp_path / "docs" / "results.md", "of another study")
+    words = ["results", "--partial", "--scale", "smoke", "--set", "results=mine", "--set", "figures=mine"]
+    assert main(words) == 0
+    assert capsys.readouterr().out == "mine/results.md\n"
+    assert "smoke scale: " in read_text(tmp_path / "mine" / "results.md")
+    assert read_text(tmp_path / "docs" / "results.md") == "of another study"
+    assert main([*words, "--output", "docs"]) == 0
+    assert "smoke scale: " in read_text(tmp_path / "docs" / "results.md")

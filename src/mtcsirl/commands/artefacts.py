@@ -53,12 +53,26 @@ def register(verbs: Verbs) -> None:
         writes="diagnostics.csv, .md",
     )
     _add(verbs, "claims", _claims, does="judge the paper's claims", writes="claims.json, .md, .pdf, .png")
-    _add(verbs, "results", _results, does="write verdicts and tables as one Markdown page", writes="results.md")
+    _add(
+        verbs,
+        "results",
+        _results,
+        does="write verdicts and tables as one Markdown page",
+        writes="results.md",
+        home="default: the results folder; --output docs makes docs/results.md",
+    )
     _add(verbs, "report", _report, does="make the page that shows everything", writes="index.html")
 
 
 def _add(
-    verbs: Verbs, name: str, run: Verb, *, does: str, writes: str, numbered: bool = False
+    verbs: Verbs,
+    name: str,
+    run: Verb,
+    *,
+    does: str,
+    writes: str,
+    numbered: bool = False,
+    home: str = "default: where the DAG puts it",
 ) -> argparse.ArgumentParser:
     verb = add_verb(
         verbs,
@@ -73,7 +87,7 @@ def _add(
         verb.add_argument("number", choices=numbers, metavar="N", help=f"as in the paper: {', '.join(numbers)}")
     verb.add_argument("--partial", action="store_true", help="read what is there and mark what is missing")
     add_study_settings(verb)
-    verb.add_argument("--output", type=new_folder, metavar="DIR", help="default: where the DAG puts it")
+    verb.add_argument("--output", type=new_folder, metavar="DIR", help=home)
     return verb
 
 
@@ -242,7 +256,7 @@ def _results(parsed: argparse.Namespace) -> None:
     rows = {name: evaluation_rows(design(settings, name), settings, partial=parsed.partial) for name in TABLES}
     tables = {name: table(rows[name], settings) for name, table in TABLES.items()}
     made = made_with(design(settings), settings)
-    page = (parsed.output or Path("docs")) / "results.md"
+    page = (parsed.output or Path(settings.results)) / "results.md"
     write_text(page, results_page(_judged(settings, parsed.partial), tables, settings, provenance=made))
     print(page)
 

@@ -24,19 +24,20 @@ def register(verbs: Verbs) -> None:
 
 def _validate(parsed: argparse.Namespace) -> None:
     from mtcsirl.files.storage import write_csv
+    from mtcsirl.settings.loading import configured
     from mtcsirl.validation.figure import caption, draw
     from mtcsirl.validation.recovery import ValidationSettings, recover
 
+    settings = None if parsed.results is None else configured({"results": str(parsed.results)})
     findings = recover(ValidationSettings(), processes=parsed.processes)
     for name, frame in findings._asdict().items():
         write_csv(parsed.output / f"{name}.csv", frame)
     figure, text = draw(findings), caption(findings)
     write_figure(parsed.figures / "validation", figure, text)
-    if parsed.results is not None:
-        from mtcsirl.settings import Settings
+    if settings is not None:
         from mtcsirl.study.artefacts import sign_artefact
 
         drawn = [parsed.figures / f"validation.{ending}" for ending in ("pdf", "png")]
         made = [parsed.output / f"{name}.csv" for name in findings._asdict()] + drawn
-        sign_artefact("validation", Settings(results=str(parsed.results)), made)
+        sign_artefact("validation", settings, made)
     print(text)

@@ -2,12 +2,16 @@
 
 import os
 import re
+from pathlib import Path
 from typing import Annotated
 
 from pydantic import AfterValidator
 
 WILD = re.compile(r"[{}<>\x00-\x1f\x7f]")
 """What Snakemake takes for a wildcard or a variable, and control characters."""
+
+_CHECKOUT = Path(__file__).resolve().parents[3]
+_SOURCE = ("src", "tests", "workflow", "config", "profiles", ".git", ".github")
 
 
 def _literal(path: str) -> str:
@@ -29,7 +33,29 @@ def _expanded(path: str) -> str:
     return "the path itself" if expanded == path or "$" in expanded else expanded
 
 
-Folder = Annotated[str, AfterValidator(_literal), AfterValidator(os.path.normpath), AfterValidator(_literal)]
-"""A folder; ``results/`` is ``results``."""
+def _to_be_filled(path: str) -> str:
+    """``path``, or ValueError: what a study writes there would be lost among, or replace, what is no result."""
+    place = Path(os.path.realpath(path))
+    there = next(one for one in (place, *place.parents) if one.exists())
+    if not there.is_dir():
+        what = "a file" if there.is_file() else "a device"
+        raise ValueError(f"{'it' if there == place else there} is {what}; name a folder")
+    if place == place.parent:
+        raise ValueError("the root of all folders; name one for the study alone")
+    if (_CHECKOUT / "Snakefile").is_file() and place.is_relative_to(_CHECKOUT):
+        inside = place.relative_to(_CHECKOUT).parts
+        if not inside or inside[0] in _SOURCE:
+            raise ValueError("a folder of this suite's own source; name another, for example results")
+    return path
+
+
+Folder = Annotated[
+    str,
+    AfterValidator(_literal),
+    AfterValidator(os.path.normpath),
+    AfterValidator(_literal),
+    AfterValidator(_to_be_filled),
+]
+"""A folder that a study may fill; ``results/`` is ``results``."""
 PathText = Annotated[str, AfterValidator(_literal)]
 """A file."""
