@@ -36,9 +36,13 @@ from mtcsirl.worlds import drawable
 gc.set_threshold(100_000)  # a DAG is many objects that all stay: looking for garbage takes a fifth of building it
 
 try:
-    for file in workflow.configfiles if workflow.is_main_process else ():
-        read_yaml(file)  # Snakemake has read them too, but takes what is ambiguous without a word
-    SETTINGS = configured(config)
+    if workflow.resource_settings.cores == 0:
+        raise UserError("--cores 0: no job could ever start; give at least 1")
+    # Snakemake has read these files too, but takes what is ambiguous without a word; those of --configfile win
+    given = {Path(file).resolve() for file in workflow.config_settings.configfiles}
+    files = sorted(workflow.configfiles if workflow.is_main_process else (), key=lambda f: Path(f).resolve() in given)
+    written = [(str(file), read_yaml(file)) for file in files]
+    SETTINGS = configured(config, [*written, ("--config", workflow.config_settings.config or {})])
     if workflow.is_main_process and workflow.resource_settings.nodes is None:
         check_study(SETTINGS)  # jobs run here and not on the nodes of a cluster
 except UserError as error:

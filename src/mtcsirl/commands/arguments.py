@@ -1,17 +1,19 @@
 """Arguments that several verbs share, and how settings come from them."""
 
 import argparse
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, TypeVar
 
 from pydantic import BaseModel
 
 from mtcsirl.errors import UserError
+from mtcsirl.files.given import as_given, check_given
 from mtcsirl.files.storage import check_writable
 from mtcsirl.names import HIGHEST_SEED, HIGHEST_TARGET_SEED, TARGETS_PER_TASK, TASKS
 from mtcsirl.settings import Settings
-from mtcsirl.settings.loading import configured, load, override, read_yaml, validate
+from mtcsirl.settings.loading import configured, load, overridden, read_yaml, validate
 from mtcsirl.settings.machine import check_agent, check_irl
 from mtcsirl.settings.runs import AgentRunSettings, IrlRunSettings
 from mtcsirl.settings.strict import StrictError, parse_json
@@ -245,19 +247,28 @@ def run_settings(
     can do it, that ``--output`` holds nothing else.
     """
     if parsed.settings:
-        data = _mapping(parsed.settings)
+        given = _given(parsed.settings)
     else:
-        data = from_study(load(parsed.config, scale=parsed.scale)).model_dump(mode="json")
-    settings = validate(model, override(data, parsed.set))
+        given = "configuration", from_study(load(parsed.config, scale=parsed.scale)).model_dump(mode="json")
+    data, sources = overridden([given], parsed.set)
+    settings = validate(model, data, sources)
     if stage:
         key = {name: getattr(parsed, name, "") for name in ("cs_reward", "method")}
-        refuse(settings, unread(stage, **key), key["method"] or stage.replace("_", "-"))
+        refuse(settings, unread(stage, **key), key["method"] or stage.replace("_", "-"), sources)
         check_folder(parsed.output, stage)
     if stage and isinstance(settings, AgentRunSettings):
         check_agent(settings)
     if stage and isinstance(settings, IrlRunSettings):
         check_irl(settings, len(parsed.demonstrations))
     return settings
+
+
+@contextmanager
+def demonstrations_given(file: Path) -> Iterator[None]:
+    """A block that reads ``file``, which a user named and a stage should have written."""
+    check_given(file, missing="run collect-demonstrations, which writes demonstrations.parquet, first")
+    with as_given("name the file demonstrations.parquet that collect-demonstrations wrote"):
+        yield
 
 
 def check_experiment(asked: str | None, found: str, members: Sequence[tuple[str, int]]) -> None:
@@ -270,16 +281,16 @@ def check_experiment(asked: str | None, found: str, members: Sequence[tuple[str,
 def study_settings(parsed: argparse.Namespace) -> Settings:
     """The whole configuration: ``--settings``, else ``config/config.yaml`` with its overlays; then ``--set``."""
     if parsed.settings:
-        return configured(override(_mapping(parsed.settings), parsed.set))
+        return configured(*overridden([_given(parsed.settings)], parsed.set))
     return load(parsed.config, parsed.set, parsed.scale)
 
 
-def _mapping(text: str) -> dict[str, Any]:
-    """JSON given on the command line, or the file of that name."""
+def _given(text: str) -> tuple[str, dict[str, Any]]:
+    """JSON given on the command line, or the file of that name; with the name of either."""
     if not text.lstrip().startswith("{"):
-        return read_yaml(text)
+        return text, read_yaml(text)
     try:
         data: dict[str, Any] = parse_json(text)
     except StrictError as error:
         raise UserError(f"--settings: {error}") from error
-    return data
+    return "--settings", data

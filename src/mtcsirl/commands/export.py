@@ -2,7 +2,7 @@
 
 import argparse
 
-from mtcsirl.commands.arguments import Verbs, add_verb, new_file, new_folder, path
+from mtcsirl.commands.arguments import Verbs, add_verb, demonstrations_given, new_file, new_folder, path
 
 
 def register(verbs: Verbs) -> None:
@@ -43,4 +43,5 @@ def _export_policy(parsed: argparse.Namespace) -> None:
 def _export_demonstrations(parsed: argparse.Namespace) -> None:
     from mtcsirl.exports.minari import export_minari
 
-    print(export_minari(parsed.demonstrations, parsed.output, parsed.name))
+    with demonstrations_given(parsed.demonstrations):
+        print(export_minari(parsed.demonstrations, parsed.output, parsed.name))

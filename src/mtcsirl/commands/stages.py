@@ -15,6 +15,7 @@ from mtcsirl.commands.arguments import (
     add_verb,
     add_workers,
     check_experiment,
+    demonstrations_given,
     method,
     path,
     run_settings,
@@ -120,7 +121,10 @@ def _learn_reward(verbs: Verbs) -> None:
         from mtcsirl.settings.runs import IrlRunSettings, irl_run
         from mtcsirl.stages.learn_reward import Learning, experiment_of, learn_reward
 
-        members = [member_of(file) for file in parsed.demonstrations]
+        members = []
+        for file in parsed.demonstrations:
+            with demonstrations_given(file):
+                members.append(member_of(file))
         experiment, source = experiment_of(members)
         if (parsed.experiment, experiment) == ("multi_target", "single_target"):
             experiment = "multi_target"  # of one target, as at smoke scale

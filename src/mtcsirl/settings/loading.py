@@ -2,15 +2,17 @@
 
 import difflib
 from collections.abc import Iterable, Mapping
+from functools import reduce
 from pathlib import Path
 from typing import Any, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
 from mtcsirl.errors import UserError
-from mtcsirl.files.storage import read_text
+from mtcsirl.files.given import read_given
 from mtcsirl.settings.configuration import Settings
 from mtcsirl.settings.scale import check_scale
+from mtcsirl.settings.sources import Sources, holder
 from mtcsirl.settings.strict import StrictError, parse
 
 Model = TypeVar("Model", bound=BaseModel)
@@ -28,15 +30,19 @@ def load(files: Iterable[Path | str] = (), overrides: Iterable[str] = (), scale:
     """
     folder = CONFIG if (CONFIG / "config.yaml").is_file() else SHIPPED
     named = [folder / "config.yaml"] if scale in (None, "desk") else [folder / "config.yaml", folder / f"{scale}.yaml"]
-    data: dict[str, Any] = {}
-    for path in [*named, *files]:
-        data = merge(data, read_yaml(path))
-    return configured(override(data, overrides))
+    sources = [(str(path), read_yaml(path)) for path in [*named, *files]]
+    return configured(*overridden(sources, overrides))
 
 
-def configured(data: Mapping[str, Any]) -> Settings:
+def overridden(sources: Sources, overrides: Iterable[str]) -> tuple[dict[str, Any], Sources]:
+    """All ``sources`` merged with the assignments of ``--set`` on top, and the sources with these among them."""
+    sources = [*sources, ("--set", override({}, overrides))]
+    return reduce(merge, (data for _, data in sources), {}), sources
+
+
+def configured(data: Mapping[str, Any], sources: Sources = ()) -> Settings:
     """``data`` as the whole configuration, whose ``scale`` is true: see `check_scale`."""
-    settings = validate(Settings, data)
+    settings = validate(Settings, data, sources)
     check_scale(settings)
     return settings
 
@@ -44,7 +50,7 @@ def configured(data: Mapping[str, Any]) -> Settings:
 def read_yaml(path: Path | str) -> dict[str, Any]:
     """A YAML (or JSON) file that holds a mapping; an empty file is an empty one."""
     try:
-        data = parse(read_text(path))
+        data = parse(read_given(path))
     except StrictError as error:
         raise UserError(f"{path}: {error}") from error
     if data is not None and not isinstance(data, dict):
@@ -78,17 +84,21 @@ def override(data: Mapping[str, Any], assignments: Iterable[str]) -> dict[str, A
     return merged
 
 
-def validate(model: type[Model], data: Mapping[str, Any]) -> Model:
-    """``data`` as settings of ``model``; raises UserError, one line with key, value and what is allowed."""
+def validate(model: type[Model], data: Mapping[str, Any], sources: Sources = ()) -> Model:
+    """``data``, merged from ``sources``, as settings of ``model``.
+
+    Raises:
+        UserError: one line with where the key was written, its value and what is allowed.
+    """
     try:
         validated = model.model_validate(dict(data))
     except ValidationError as error:
-        raise UserError(_one_line(model, data, error)) from error
-    _reject_booleans(data, validated.model_dump(), "")
+        raise UserError(_one_line(model, data, error, sources)) from error
+    _reject_booleans(data, validated.model_dump(), "", sources)
     return validated
 
 
-def _one_line(model: type[BaseModel], data: Mapping[str, Any], error: ValidationError) -> str:
+def _one_line(model: type[BaseModel], data: Mapping[str, Any], error: ValidationError, sources: Sources) -> str:
     """The first wrong key, all that is said about it, and how many others are wrong."""
     said: dict[str, list[str]] = {}
     values: dict[str, Any] = {}
@@ -102,7 +112,7 @@ def _one_line(model: type[BaseModel], data: Mapping[str, Any], error: Validation
     first = next(iter(said))
     shown = "" if isinstance(values[first], Mapping) else f" = {values[first]!r}"
     others = f" (and {len(said) - 1} more wrong: {', '.join(list(said)[1:])})" if len(said) > 1 else ""
-    return f"configuration: {first or 'settings'}{shown}: {' or '.join(dict.fromkeys(said[first]))}{others}"
+    return f"{holder(first, sources)}: {first or 'settings'}{shown}: {' or '.join(dict.fromkeys(said[first]))}{others}"
 
 
 def _real_path(location: tuple[int | str, ...], data: Any) -> tuple[str, ...]:
@@ -140,13 +150,14 @@ def _unknown_key(model: type[BaseModel], path: tuple[str, ...]) -> str:
     return f"unknown key{hint}; allowed: {', '.join(model.model_fields)}"
 
 
-def _reject_booleans(raw: Any, validated: Any, name: str) -> None:
+def _reject_booleans(raw: Any, validated: Any, name: str, sources: Sources) -> None:
     """YAML's yes and no would pass for the numbers 1 and 0."""
     if isinstance(raw, Mapping) and isinstance(validated, Mapping):
         for part, value in raw.items():
-            _reject_booleans(value, validated.get(part), f"{name}.{part}".lstrip("."))
+            _reject_booleans(value, validated.get(part), f"{name}.{part}".lstrip("."), sources)
     elif isinstance(raw, list | tuple) and isinstance(validated, list | tuple):
         for index, (old, new) in enumerate(zip(raw, validated, strict=False)):
-            _reject_booleans(old, new, f"{name}.{index}")
+            _reject_booleans(old, new, f"{name}.{index}", sources)
     elif isinstance(raw, bool) and not isinstance(validated, bool):
-        raise UserError(f"configuration: {name} = {raw}: must be a {type(validated).__name__}, not a truth value")
+        where = holder(name, sources)
+        raise UserError(f"{where}: {name} = {raw}: must be a {type(validated).__name__}, not a truth value")

@@ -11,6 +11,7 @@ from typing import Any, TypeVar
 from pydantic import BaseModel
 
 from mtcsirl.errors import UserError
+from mtcsirl.settings.sources import Sources, holder
 
 Model = TypeVar("Model", bound=BaseModel)
 
@@ -73,12 +74,13 @@ def sliced(settings: Model, keys: Iterable[str]) -> Model:
     return settings
 
 
-def refuse(settings: BaseModel, keys: Iterable[str], who: str) -> None:
+def refuse(settings: BaseModel, keys: Iterable[str], who: str, sources: Sources = ()) -> None:
     """Raise UserError where one of ``keys`` is not at its default: ``who`` does not read it."""
     for key in keys:
         value, default = _get(settings, key), _get(type(settings)(), key)
         if value != default:
-            raise UserError(f"configuration: {key} = {value!r}: {who} does not read this key; leave it out")
+            where = holder(key, sources)
+            raise UserError(f"{where}: {key} = {value!r}: {who} does not read this key; leave it out")
 
 
 def _with_default(settings: Any, parts: list[str]) -> Any:

@@ -13,12 +13,15 @@ import numpy as np
 from pydantic import Field, field_validator
 
 from mtcsirl.errors import UserError
+from mtcsirl.files.given import as_given, check_given
 from mtcsirl.files.storage import read_json
 from mtcsirl.settings.base import Frozen
 from mtcsirl.settings.loading import validate
 
 CALIBRATION = Path(__file__).with_name("calibration.json")
 DEFAULT = "default"
+_NAME_ONE = "name a file that mtcsirl calibrate --output FILE wrote"
+_AGAIN = "measure again by mtcsirl calibrate --output FILE, a new one"
 
 Count = Annotated[int, Field(gt=0)]
 Seconds = Annotated[float, Field(gt=0)]
@@ -108,13 +111,15 @@ def load_rates(path: Path | str = CALIBRATION) -> Rates:
     Raises:
         UserError: the file is missing, empty or no JSON, or a rate is missing or cannot be.
     """
-    said = read_json(path)
+    check_given(path, missing=_NAME_ONE)
+    with as_given(_NAME_ONE):
+        said = read_json(path)
     if not isinstance(said, dict):
-        raise UserError(f"{path}: holds no rates; write it by mtcsirl calibrate --output {path}")
+        raise UserError(f"{path}: holds no rates; {_NAME_ONE}")
     if missing := [name for name in Rates.model_fields if name not in said]:
-        raise UserError(f"{path}: lacks {', '.join(missing)}; measure again by mtcsirl calibrate --output {path}")
+        raise UserError(f"{path}: lacks {', '.join(missing)}; {_AGAIN}")
     try:
         return validate(Rates, said)
     except UserError as error:
         reason = str(error).removeprefix("configuration: ")
-        raise UserError(f"{path}: {reason}; measure again by mtcsirl calibrate --output {path}") from error
+        raise UserError(f"{path}: {reason}; {_AGAIN}") from error
