@@ -21,6 +21,7 @@ from tests.words import learn_reward
 
 KEY = ["--task", "reach", "--seed", "0"]
 VELOCITY = ["--cs-reward", "velocity"]
+EVALUATE = ["evaluate", *KEY, "--policy", ".", "--output", "x"]
 
 
 def fails(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
@@ -61,6 +62,12 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         (["plan", "--rates", ""], "--rates: must not be empty"),
         (["table", "2", "--output", ""], "--output: must not be empty"),
         (["evaluate", *KEY, "--policy", "", "--output", "x"], "--policy: must not be empty"),
+        ([*EVALUATE, "--cs-reward", "banana"], "unknown common-sense reward 'banana'; allowed: velocity, "),
+        ([*EVALUATE, "--set", "environment.observation=raw"], "environment.observation = 'raw': evaluate does"),
+        ([*EVALUATE, "--set", "environment={observation: raw}"], "environment.observation = 'raw': evaluate does"),
+        ([*EVALUATE, "--set", "sac.minibatch=3"], "sac.minibatch = 3: evaluate does not read this key, only"),
+        ([*EVALUATE, "--set", "evaluation.episodes=2", "--set", "steps=7"], "steps = 7: evaluate does not read"),
+        ([*EVALUATE, "--set", "evaluation.episode=2"], "evaluation.episode = 2: unknown key, did you mean episodes?"),
         (["plan", "--settings", '{"seeds": [0], "seeds": [1]}'], "--settings: the key 'seeds' stands twice"),
         (
             ["train-sac", *KEY, "--output", "x", "--set", "cs_weight=3"],

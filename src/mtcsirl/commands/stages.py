@@ -15,6 +15,7 @@ from mtcsirl.commands.arguments import (
     add_verb,
     add_workers,
     check_experiment,
+    cs_reward,
     demonstrations_given,
     method,
     path,
@@ -225,12 +226,15 @@ def _evaluate(verbs: Verbs) -> None:
         from mtcsirl.episodes.evaluation import COLUMNS, evaluate
         from mtcsirl.episodes.policy import load_policy
         from mtcsirl.files.storage import write_csv
+        from mtcsirl.settings.loading import override
         from mtcsirl.settings.runs import AgentRunSettings, baseline_run
+        from mtcsirl.settings.unread import EVALUATE, refuse_others
 
         check_without_run(parsed.output, "evaluation.csv")
         settings = run_settings(parsed, AgentRunSettings, lambda s: baseline_run(s, parsed.task))
+        refuse_others(override({}, parsed.set), EVALUATE, "evaluate")
         policy = load_policy(parsed.policy)
-        rows = evaluate(policy, parsed.task, parsed.target, parsed.cs_reward, parsed.seed, settings)
+        rows = evaluate(policy, parsed.task, parsed.target, parsed.cs_reward or "", parsed.seed, settings)
         frame = pd.DataFrame(rows, columns=list(COLUMNS))
         write_csv(parsed.output / "evaluation.csv", frame)
         print(frame.groupby(["policy", "metric"])["value"].agg(["mean", "std"]).round(3).to_string())
@@ -245,7 +249,8 @@ def _evaluate(verbs: Verbs) -> None:
     )
     verb.add_argument("--policy", required=True, type=_folder, metavar="DIR", help="folder of the agent")
     add_agent(verb, cs_reward=False)
-    verb.add_argument("--cs-reward", default="", help="name to write into the rows")
+    does = "what its rows say that the agent was trained on; default: no common-sense reward"
+    verb.add_argument("--cs-reward", type=cs_reward, metavar="NAME", help=does)
     add_run_settings(verb)
     add_output(verb)
 

@@ -4,7 +4,7 @@ They stay at their defaults in its settings, so that a change elsewhere makes no
 for a single run is told so. A test trains every kind of run and holds this list against what changes its results.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from functools import cache
 from typing import Any, TypeVar
 
@@ -48,6 +48,8 @@ METHODS: dict[str, tuple[str, ...]] = {
     "mt_csirl_lt": (*_OF_KNOWN_REWARD, *_OF_BOTTLENECK, *_OF_VAIRL_GP),
 }
 """By method; one of an extension is taken to read everything."""
+EVALUATE = ("environment.target_seed", "evaluation.episodes", "evaluation.episode_steps")
+"""All that the evaluation of a stored policy reads: what it sees is in its own file."""
 
 
 def unread(stage: str, *, cs_reward: str = "", method: str = "") -> tuple[str, ...]:
@@ -81,6 +83,17 @@ def refuse(settings: BaseModel, keys: Iterable[str], who: str, sources: Sources 
         if value != default:
             where = holder(key, sources)
             raise UserError(f"{where}: {key} = {value!r}: {who} does not read this key; leave it out")
+
+
+def refuse_others(given: Mapping[str, Any], read: Iterable[str], who: str, prefix: str = "") -> None:
+    """Raise UserError where the assignments ``given`` by --set hold a key that is not among those ``read``."""
+    for name, value in given.items():
+        key = f"{prefix}{name}"
+        if key in read:
+            continue
+        if not isinstance(value, Mapping):
+            raise UserError(f"--set: {key} = {value!r}: {who} does not read this key, only {', '.join(read)}")
+        refuse_others(value, read, who, f"{key}.")
 
 
 def _with_default(settings: Any, parts: list[str]) -> Any:
