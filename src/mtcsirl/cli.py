@@ -3,23 +3,38 @@
 Heavy modules are imported by the verb that needs them, so that ``--help`` and ``status`` answer at once.
 """
 
-import argparse
-import errno
-import gc
-import logging
-import os
-import shlex
 import sys
-import traceback
-from collections.abc import Sequence
-from typing import NoReturn
 
-from mtcsirl import __version__
-from mtcsirl.commands import archive, artefacts, diagnostics, doctor, export, stages, study, together, validate, video
-from mtcsirl.errors import UserError
-from mtcsirl.extensions import load_from_environment
-from mtcsirl.files import console, stop
-from mtcsirl.worlds.variables import backend
+try:  # Ctrl-C at once is no fault of an import
+    import argparse
+    import errno
+    import gc
+    import logging
+    import os
+    import shlex
+    import traceback
+    from collections.abc import Sequence
+    from typing import NoReturn
+
+    from mtcsirl import __version__
+    from mtcsirl.commands import (
+        archive,
+        artefacts,
+        diagnostics,
+        doctor,
+        export,
+        stages,
+        study,
+        together,
+        validate,
+        video,
+    )
+    from mtcsirl.errors import UserError
+    from mtcsirl.extensions import load_from_environment
+    from mtcsirl.files import console, stop
+    from mtcsirl.worlds.variables import backend
+except KeyboardInterrupt:
+    sys.exit(130)
 
 THREADS = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS")
 _WAYS_OUT = {

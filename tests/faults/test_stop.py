@@ -128,3 +128,23 @@ def test_a_signal_while_a_library_loads_is_no_bug(tmp_path: Path) -> None:
     assert done.returncode == 143
     says = "stopped by SIGTERM; the same command goes on from its last checkpoint, if it has one"
     assert done.stderr == f"mtcsirl: {says}\n"
+
+
+WHILE_IT_LOADS = """
+import signal, sys
+
+class Finder:
+    def find_spec(self, name, path=None, target=None):
+        if name == sys.argv[1]:
+            print("inside")
+            signal.raise_signal(signal.SIGINT)
+
+sys.meta_path.insert(0, Finder())
+import mtcsirl.cli
+"""
+
+
+@pytest.mark.parametrize("module", ["argparse", "mtcsirl.commands.video", "pydantic"])
+def test_ctrl_c_in_the_first_moment_shows_no_import(module: str) -> None:
+    done = subprocess.run([sys.executable, "-c", WHILE_IT_LOADS, module], capture_output=True, text=True, check=False)
+    assert (done.stdout, done.stderr, done.returncode) == ("inside\n", "", 130)
