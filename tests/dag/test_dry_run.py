@@ -91,7 +91,7 @@ def test_a_bad_configuration_is_one_line_and_leaves_no_trace(planner: Snakemake,
     value, says = BAD[mistake]
     done = planner("--cores", "1", "--config", value, cwd=tmp_path)
     assert done.returncode != 0
-    (line,) = [line for line in done.stderr.splitlines() if line.startswith("configuration:")]
+    (line,) = [line for line in done.stderr.splitlines() if line.startswith("--config: ")]
     assert says in line
     assert "Traceback" not in done.stderr
     assert {path.name for path in tmp_path.iterdir()} <= {".snakemake"}, "no result is written"

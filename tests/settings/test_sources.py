@@ -38,7 +38,7 @@ WRONG = [
     (["plan", "--rates", "latin.yaml"], "name a file that mtcsirl calibrate --output FILE wrote"),
     (["learn-reward", *LEARN, "--demonstrations", "README.md"], "name the file demonstrations.parquet that"),
     (["learn-reward", *LEARN, "--demonstrations", "."], ".: is a folder; name a file"),
-    (["learn-reward", *LEARN, "--demonstrations", "nope"], "nope: no such file; run collect-demonstrations, which"),
+    (["learn-reward", *LEARN, "--demonstrations", "nope"], "nope: no such file; run the stage that makes it first"),
     (
         ["export-demonstrations", "--output", "x", "--demonstrations", "README.md"],
         "name the file demonstrations.parquet",
