@@ -18,11 +18,16 @@ ROWS = {
     "new agents on the learned reward": "transfer/single_target/mt_csirl/{metric}/reach-wall/reach-wall-t0",
     "SAC": "sac/reach-wall-t0",
 }
-
+UNSEEN = {
+    task: f"transfer/multi_task/mt_csirl/{{metric}}/all/{task}-t0"
+    for task in ("reach-wall", "button-press-topdown-wall", "drawer-close", "push-back")
+}
+"""The first cell of each row about MT-CSIRL's reward of six tasks, and the folders of its new agents."""
 
 CORRELATIONS = {
     "one task, velocity": "scores/single_target/mt_csirl/velocity/reach-wall/reach-wall-t0",
     "one task, action norm": "scores/single_target/mt_csirl/action_norm/reach-wall/reach-wall-t0",
+    "six tasks, velocity": "scores/multi_task/mt_csirl/velocity/all/reach-wall-t0",
     "six tasks, action norm": "scores/multi_task/mt_csirl/action_norm/all/reach-wall-t0",
 }
 """The first cell of each row of the README's correlations, and the folder of its scores."""
@@ -50,7 +55,7 @@ def correlations_from_archive(archive: Path) -> dict[str, list[str]]:
 def cells(text: str) -> dict[str, list[str]]:
     """The table's rows by their first cell."""
     rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in text.splitlines() if line[:2] == "| "]
-    return {first: rest for first, *rest in rows if first in ROWS}
+    return {first: rest for first, *rest in rows if first in ROWS | UNSEEN}
 
 
 def correlations(text: str) -> dict[str, list[str]]:
@@ -63,8 +68,8 @@ def from_archive(archive: Path) -> dict[str, list[str]]:
     """What the rows must say: mean over seeds with its t-interval, and mean success, for each cs-reward."""
     rows = read(archive, "evaluation").query("policy == 'stochastic' and kept == 'kept'")
     means = rows.groupby(["folder", "metric"])["value"].mean().unstack()
-    found: dict[str, list[str]] = {name: [] for name in ROWS}
-    for name, pattern in ROWS.items():
+    found: dict[str, list[str]] = {name: [] for name in ROWS | UNSEEN}
+    for name, pattern in (ROWS | UNSEEN).items():
         for metric in ("velocity", "action_norm"):
             own = means[means.index.str.fullmatch(re.escape(pattern.format(metric=metric)) + r"/s\d+")]
             assert len(own) == 5, f"{name}: n = 5"

@@ -14,6 +14,7 @@ STEPS = np.arange(1_000, 40_001, 1_000)
 TARGETS = {"velocity": 0.8, "action_norm": 3.0}
 PLATEAUS = {"velocity": {"expert": 0.81, "irl": 0.78, "transfer": 0.70, "sac": 0.32}}
 PLATEAUS["action_norm"] = {"expert": 2.95, "irl": 2.9, "transfer": 2.7, "sac": 1.6}
+PLATEAUS["success"] = {"expert": 1.0, "irl": 0.9, "transfer": 0.5, "sac": 1.0}
 
 
 def made_up_data(settings: Settings | None = None, *, noise: float = 0.04) -> FigureData:
@@ -31,7 +32,7 @@ def made_up_data(settings: Settings | None = None, *, noise: float = 0.04) -> Fi
 
 def _run_curves(run, generator, noise):
     keys = {"stage": run.stage, "experiment": "", "method": "", "cs_reward": "", "source": "", "seed": None}
-    metrics = ["velocity", "action_norm"]
+    metrics = ["velocity", "action_norm", "success"]
     if isinstance(run, Expert):
         members, kind, keys["cs_reward"] = [(run.task, run.target)], "expert", run.cs_reward
     elif isinstance(run, Baseline):

@@ -4,7 +4,16 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from mtcsirl.figures.curves import Series, counts, curve_title, draw_curves, missing_note, summarise_curve, tasks_note
+from mtcsirl.figures.curves import (
+    Series,
+    counts,
+    curve_title,
+    draw_curves,
+    missing_note,
+    success_note,
+    summarise_curve,
+    tasks_note,
+)
 from mtcsirl.figures.style import LOOKS, new_figure
 
 
@@ -53,6 +62,14 @@ def test_bins_average_steps():
     curve = summarise_curve(rows({("a", 0): list(range(100))}, steps=range(1, 101)), bins=10)
     assert len(curve) == 10
     assert curve["mean"].tolist() == pytest.approx([4.5 + 10 * k for k in range(10)])
+
+
+def test_success_is_that_of_the_last_tenth_of_each_agents_steps():
+    """One agent succeeds at last; another, whose run is longer, no more; two seeds of a task count as one task."""
+    late = [0.0] * 9 + [1.0]
+    some = series({("a", 0): late, ("a", 1): late, ("b", 0): [1.0] * 18 + [0.5] * 2}, [], steps=range(1, 21))
+    assert success_note([some, series({}, [("a", 0)])]) == ["success at the end of training: SAC 75 %"]
+    assert success_note([series({}, [("a", 0)])]) == []
 
 
 def test_missing_runs_are_named():

@@ -81,6 +81,7 @@ def test_missing_runs_are_named_and_the_rest_is_drawn(data):
         FigureData(settings=data.settings, curves=data.curves[~gone], scores=data.scores, points=data.points)
     )
     assert "(a) not there yet – Transferred: reach-wall seed 2" in texts(figure)
+    assert "(a) success at the end of training: IRL agent" in texts(figure)
     assert any(line.get_label() == "Transferred" for line in figure.axes[0].lines)
 
 

@@ -133,6 +133,22 @@ def tasks_note(series: Sequence[Series]) -> list[str]:
     return [f"mean over the tasks that are there – {'; '.join(parts)}"] if parts else []
 
 
+def success_note(series: Sequence[Series]) -> list[str]:
+    """One line with the success of each series' agents in the last tenth of their own steps, from rows of ``success``.
+
+    Curves of a cs-reward do not show an agent that has the behaviour and has lost its task.
+    """
+    said = [f"{one.label} {100 * _last_tenth(one.rows):.0f} %" for one in series if len(one.rows)]
+    return [f"success at the end of training: {', '.join(said)}"] if said else []
+
+
+def _last_tenth(rows: pd.DataFrame) -> float:
+    """Mean over agents of each one's mean after nine tenths of its steps; every task counts once."""
+    agent = ["task", "seed"]
+    late = rows[rows["step"] > 0.9 * rows.groupby(agent)["step"].transform("max")]
+    return float(late.groupby(agent)["value"].mean().groupby("task").mean().mean())
+
+
 def curve_title(metric: str, target: float | None, series: Sequence[Series]) -> str:
     """As in "Velocity, target 0.8, n = 5": a label at the line would cover the curves that reach it.
 

@@ -3,7 +3,15 @@
 from matplotlib.figure import Figure
 
 from mtcsirl.figures import multi_task
-from mtcsirl.figures.curves import add_legend, counts, curve_title, draw_curves, missing_note, tasks_note
+from mtcsirl.figures.curves import (
+    add_legend,
+    counts,
+    curve_title,
+    draw_curves,
+    missing_note,
+    success_note,
+    tasks_note,
+)
 from mtcsirl.figures.data import FigureData
 from mtcsirl.figures.scatter import draw_scatter, scatter_caption
 from mtcsirl.figures.style import (
@@ -19,6 +27,7 @@ from mtcsirl.figures.style import (
 
 TITLE = "Ground-truth cs-reward on unseen tasks"
 _SCATTER = "velocity"
+SUCCESS = "success"
 
 
 @styled
@@ -32,7 +41,9 @@ def draw(data: FigureData) -> Figure:
         series = multi_task.curve_series(data, metric)
         draw_curves(axes[index], series, metric, target_of(metric))
         panel_title(axes[index], index, curve_title(metric, target_of(metric), series))
-        notes += [f"({chr(ord('a') + index)}) {note}" for note in missing_note(series) + tasks_note(series)]
+        success = success_note(multi_task.curve_series(data, metric, SUCCESS))
+        own = missing_note(series) + tasks_note(series) + success
+        notes += [f"({chr(ord('a') + index)}) {note}" for note in own]
     panel_title(axes[-1], len(metrics), "Rewards' correlation")
     draw_scatter(axes[-1], multi_task.correlation(data, _SCATTER), multi_task.METHOD, _SCATTER)
     add_legend(figure, list(axes[:-1]))
@@ -52,6 +63,7 @@ def caption(data: FigureData) -> str:
         f"learned from {', '.join(data.settings.multi_task.train_tasks)}, SAC r_task alone; training episodes of the "
         "stochastic policy. Red line: target. Lines and bands: mean and 95 % t-interval over seeds "
         f"({numbers}); bands are cut off at the frame, curves end where the shortest run does. "
+        "Success below the panels: of training episodes in the last tenth of each agent's steps. "
         f"({chr(ord('a') + len(metrics))}) {scatter_caption(found, _SCATTER)} "
         f"Scored on {data.settings.multi_task.unseen_tasks[0]}."
     )

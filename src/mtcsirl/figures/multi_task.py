@@ -10,11 +10,14 @@ from mtcsirl.study.design import design
 EXPERIMENT, METHOD, SOURCE = "multi_task", "mt_csirl", "all"
 
 
-def curve_series(data: FigureData, metric: str) -> list[Series]:
-    """Expert, MT-CSIRL (transferred) and SAC on the unseen tasks."""
+def curve_series(data: FigureData, metric: str, shown: str = "") -> list[Series]:
+    """Expert, MT-CSIRL (transferred) and SAC on the unseen tasks, for the cs-reward ``metric``.
+
+    ``shown``: another metric of the same agents.
+    """
     study = design(data.settings, "figure_3")
     tasks = data.settings.multi_task.unseen_tasks
-    here = {"target": EVALUATION_TARGET, "metric": metric, "task": tasks}
+    here = {"target": EVALUATION_TARGET, "metric": shown or metric, "task": tasks}
     reward = {"experiment": EXPERIMENT, "method": METHOD, "cs_reward": metric, "source": SOURCE}
     experts = [run for run in study.experts if run.cs_reward == metric and run.target == EVALUATION_TARGET]
     transfers = [run for run in study.transfers if run.irl.cs_reward == metric]

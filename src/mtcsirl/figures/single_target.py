@@ -3,7 +3,15 @@
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from mtcsirl.figures.curves import Series, add_legend, counts, curve_title, draw_curves, missing_note
+from mtcsirl.figures.curves import (
+    Series,
+    add_legend,
+    counts,
+    curve_title,
+    draw_curves,
+    missing_note,
+    success_note,
+)
 from mtcsirl.figures.data import FigureData, rows_where
 from mtcsirl.figures.scatter import Correlation, draw_scatter, scatter_caption, select_correlation
 from mtcsirl.figures.style import (
@@ -26,10 +34,13 @@ EXPERIMENT = "single_target"
 SCATTER_CS_REWARD = "velocity"
 
 
-def curve_series(data: FigureData, artefact: str, task: str, metric: str) -> list[Series]:
-    """IRL agent, Transferred and SAC on ``task``, with the runs that ``artefact`` asks for."""
+def curve_series(data: FigureData, artefact: str, task: str, metric: str, shown: str = "") -> list[Series]:
+    """IRL agent, Transferred and SAC on ``task``, with the runs that ``artefact`` asks for.
+
+    ``metric``: the cs-reward that they are about; ``shown``: another metric of the same agents.
+    """
     study = design(data.settings, artefact)
-    here = {"task": task, "target": EVALUATION_TARGET, "metric": metric}
+    here = {"task": task, "target": EVALUATION_TARGET, "metric": shown or metric}
     reward = {"experiment": EXPERIMENT, "cs_reward": metric, "source": task}
     transfers = [run for run in study.transfers if run.irl.cs_reward == metric and run.irl.experiment == EXPERIMENT]
     runs = [run for run in study.irl_runs if run.cs_reward == metric and run.source == task]
@@ -79,7 +90,8 @@ def draw(data: FigureData, artefact: str, task: str, metrics: list[str], *, scat
         draw_curves(axes[index], series, metric, target_of(metric))
         _mark_warm_up(axes[index], warm_up_steps(data, task))
         panel_title(axes[index], index, curve_title(metric, target_of(metric), series))
-        notes += [f"({chr(ord('a') + index)}) {note}" for note in missing_note(series)]
+        success = success_note(curve_series(data, artefact, task, metric, "success"))
+        notes += [f"({chr(ord('a') + index)}) {note}" for note in missing_note(series) + success]
     if scatter:
         panel_title(axes[-1], panels - 1, "Rewards' correlation")
         method = data.settings.single_target.method
@@ -100,7 +112,8 @@ def caption(data: FigureData, artefact: str, task: str, metrics: list[str], *, s
         "(IRL agent), a new agent trained from scratch on r_task + the learned cs-reward (Transferred) and an agent "
         "without any cs-reward (SAC), training episodes of the stochastic policy. Red line: target. "
         f"Lines and bands: mean and 95 % t-interval over seeds ({numbers}); bands are cut off at the frame, "
-        "curves end where the shortest run does."
+        "curves end where the shortest run does. Success below the panels: of training episodes in the last tenth of "
+        "each agent's steps."
     )
     warm_up = warm_up_steps(data, task)
     if warm_up:
