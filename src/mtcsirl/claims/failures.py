@@ -89,10 +89,11 @@ def stays_behind(evidence: Evidence, rules: Rules) -> Iterator[Unit]:
             source = multi_target(settings, cs, home)
             group, own = evidence.transfers(source, others), evidence.transfers(source, [home])
             sac, sac_own = evidence.sac(cs, others), evidence.sac(cs, [home])
+            lead = behind(group, own)
             fates = {task: _fate(group.on(task), sac.on(task), rules) for task in others}
             parts = [
                 staying_below(group.distance, sac.distance, rules["at_most"]),
-                surely("behind its own task, seed by seed", (1.0, behind(group, own))),
+                surely("behind its own task, seed by seed", (1.0, lead)),
                 _most([answer for answer, _ in fates.values()], rules["share"]),
             ]
             outcomes = [outcome for _, outcome in fates.values()]
@@ -103,8 +104,8 @@ def stays_behind(evidence: Evidence, rules: Rules) -> Iterator[Unit]:
                 Summary(printed * group.target, np.nan, paper.seeds), outcome=_summed(outcomes),
                 paper_value=closed_in_paper(printed, printed_sac, 1.0), holds=Interval(-np.inf, rules["at_most"]),
             )  # fmt: skip
-            groups, pairs = (group, sac, own, sac_own), behind(group, own).n
-            unit = checked(evidence, against(unit, group, own, "own task"), rules, source, *groups, pairs=pairs)
+            groups = group, sac, own, sac_own
+            unit = checked(evidence, against(unit, group, own, "own task"), rules, source, *groups, pairs=lead.n)
             # Transfer elsewhere contradicts the claim, whatever becomes of the reward's own task.
             against_it = unit.state == NOT_MET and TRANSFERS in outcomes
             yield unit if against_it else works_at_home(unit, own, sac_own, rules["needs_diagonal"])

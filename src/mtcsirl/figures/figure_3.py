@@ -27,7 +27,6 @@ from mtcsirl.figures.style import (
 
 TITLE = "Ground-truth cs-reward on unseen tasks"
 _SCATTER = "velocity"
-SUCCESS = "success"
 
 
 @styled
@@ -41,7 +40,7 @@ def draw(data: FigureData) -> Figure:
         series = multi_task.curve_series(data, metric)
         draw_curves(axes[index], series, metric, target_of(metric))
         panel_title(axes[index], index, curve_title(metric, target_of(metric), series))
-        success = success_note(multi_task.curve_series(data, metric, SUCCESS))
+        success = success_note(multi_task.curve_series(data, metric, "success"))
         own = missing_note(series) + tasks_note(series) + success
         notes += [f"({chr(ord('a') + index)}) {note}" for note in own]
     panel_title(axes[-1], len(metrics), "Rewards' correlation")

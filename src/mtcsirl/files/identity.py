@@ -70,6 +70,7 @@ def dumps(record: Record) -> str:
 
 
 REMAKE = "delete its folder and make it again"
+"""The way out of a damaged record where its run lies in the results."""
 
 
 def parse_record(text: str, where: str, way_out: str = REMAKE) -> Record:
