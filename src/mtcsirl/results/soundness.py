@@ -30,18 +30,18 @@ from mtcsirl.results.packing import (
 from mtcsirl.results.parts import AGAIN
 from mtcsirl.results.verdicts import faults_of_gate
 from mtcsirl.study.keys import read_folder
-from mtcsirl.study.outputs import OUTPUTS
+from mtcsirl.study.outputs import FOLDERS, OUTPUTS
 from mtcsirl.study.runs import KINDS
 
 POLICIES = re.compile(r"policies/[\w-]+\.(json|safetensors)", re.ASCII)
-"""What an IRL run leaves beside its outputs."""
+"""The files of a folder that a stage leaves beside its outputs."""
 TIDY = {**CSVS, THINNED: DIAGNOSTICS}
 
 
 def leaves(stage: str, name: str) -> bool:
     """Whether ``name`` is a result file that a run of ``stage`` leaves; never one that leads out of its folder."""
     known = name in OUTPUTS.get(stage, ()) and name != PROVENANCE
-    return known or (stage == "learn_reward" and POLICIES.fullmatch(name) is not None)
+    return known or (name.startswith(FOLDERS.get(stage, ())) and POLICIES.fullmatch(name) is not None)
 
 
 def foreign(record: Record) -> list[str]:
