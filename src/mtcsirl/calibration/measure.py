@@ -1,4 +1,4 @@
-"""Measures the rates of this machine (:mod:`mtcsirl.study.rates`). One thread, about five minutes.
+"""Measures the rates of this machine (:mod:`mtcsirl.study.rates`). One thread, more than seven minutes.
 
 The loops are those that train, with memories as full as theirs, so that what a plan adds up has been timed where it
 happens. CPU seconds, so that what else the machine does shifts them little; it should do little all the same. All is

@@ -92,7 +92,7 @@ def register(verbs: Verbs) -> None:
         verbs,
         "calibrate",
         _calibrate,
-        does="measure this machine's rates, about five minutes",
+        does="measure this machine's rates, more than seven minutes",
         needs="a machine that has nothing else to do",
         writes="the file that plan reads, --output",
     )
