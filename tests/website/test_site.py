@@ -17,7 +17,8 @@ from tests.conftest import CHECKOUT
 from tests.report.browser import CHROMIUM
 
 READ = ("docs", "website", "src", "examples", "mkdocs.yml", "README.md", "CONTRIBUTING.md", "CHANGELOG.md")
-READ += ("LICENSE", "CITATION.cff", "benchmarks/results.json", "benchmarks/results.png", "paper_figs/figure_2.png")
+READ += ("LICENSE", "CITATION.cff", "benchmarks/results.json", "benchmarks/results.png")
+READ += tuple(f"paper_figs/{file.name}" for file in (CHECKOUT / "paper_figs").glob("figure_*.png"))
 needs_chromium = pytest.mark.skipif(CHROMIUM is None, reason="chromium is not installed: apt-get install chromium")
 
 
