@@ -25,7 +25,7 @@ from mtcsirl.study.keys import identity_of
 from mtcsirl.study.outputs import OUTPUTS
 from mtcsirl.study.plan import cost, plan, wall_hours
 from mtcsirl.study.rates import CALIBRATION, Rates, by_minibatch, load_rates
-from mtcsirl.study.runs import Expert
+from mtcsirl.study.runs import Expert, IrlRun
 from mtcsirl.study.status import DONE, FAILED, RUNNING, STALE, WAITING, run_status, seconds_left, study_status
 
 KEY = ["--task", "reach", "--seed", "0"]
@@ -323,7 +323,7 @@ def test_status_follows_a_run(small: Settings, tmp_path: Path) -> None:
     for name in OUTPUTS[run.stage]:
         storage.write_text(folder / name, "x")
     storage.write_json(folder / "settings.json", run.settings(small).model_dump(mode="json"))
-    storage.write_json(folder / "provenance.json", {"cost": {"wall_seconds": 12.0}})
+    storage.write_json(folder / "provenance.json", {"cost": {"cpu_seconds": 12.0}})
     storage.write_json(folder / "gate.json", {"passed": False})
     record = Record(identity_of(run, small), checksums(folder, result_files(folder)))
     storage.write_text(folder / FILE, dumps(record))
@@ -343,6 +343,15 @@ def test_time_left_is_what_the_done_runs_took(small: Settings, rates: Rates) -> 
     assert seconds_left(statuses, small, rates, 2) == pytest.approx(
         sum(cost(status.run, small, rates).seconds for status in statuses) / 2
     )
+    planned = {status.run: cost(status.run, small, rates).seconds for status in statuses}
+    smallest = min((run for run in planned if run.stage == IrlRun.stage), key=planned.__getitem__)
+    slow = [
+        dataclasses.replace(status, state=DONE, seconds=3 * planned[smallest]) if status.run == smallest else status
+        for status in statuses
+    ]
+    irl = sum(seconds for run, seconds in planned.items() if run.stage == IrlRun.stage and run != smallest)
+    rest = sum(seconds for run, seconds in planned.items() if run.stage != IrlRun.stage)
+    assert seconds_left(slow, small, rates, 2) == pytest.approx((3 * irl + rest) / 2), "a larger run takes longer"
 
 
 def test_status_verb_on_an_empty_folder(small: Settings, capsys: pytest.CaptureFixture[str]) -> None:

@@ -1,7 +1,7 @@
 """How far a study is, read from its results folder while it runs or after: `mtcsirl status`."""
 
 import time
-from collections import Counter
+from collections import Counter, defaultdict
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -28,7 +28,7 @@ TOP = 2
 
 @dataclass(frozen=True)
 class RunStatus:
-    """One run: its state, its gate (None: not done, or has none), the seconds it took, what there is to say of it."""
+    """One run: its state, its gate (None: not done, or has none), its CPU seconds, what there is to say of it."""
 
     run: AnyRun
     state: str
@@ -74,22 +74,25 @@ def before_it_starts(study: Runs, settings: Settings) -> str:
 
 
 def seconds_left(statuses: list[RunStatus], settings: Settings, rates: Rates, cores: int) -> float:
-    """Wall seconds for what is not done: the mean of the stage's done runs, or the plan's estimate before any is."""
-    took: dict[str, list[float]] = {}
+    """Seconds of undisturbed cores for what is not done: as planned, times what the stage's done runs took of it.
+
+    The mean of the done runs would take those to come for runs of their size: rewards of one task are learned first.
+    """
+    planned, took, left = (defaultdict[str, float](float) for _ in range(3))
     for status in statuses:
-        if status.state == DONE and status.seconds is not None:
-            took.setdefault(status.run.stage, []).append(status.seconds)
-    total = 0.0
-    for status in statuses:
+        stage, seconds = status.run.stage, cost(status.run, settings, rates).seconds
         if status.state != DONE:
-            known = took.get(status.run.stage)
-            total += sum(known) / len(known) if known else rates.slowdown * cost(status.run, settings, rates).seconds
-    return total / cores
+            left[stage] += seconds
+        elif status.seconds is not None:
+            planned[stage] += seconds
+            took[stage] += status.seconds
+    pace = {stage: took[stage] / planned[stage] if planned[stage] else rates.slowdown for stage in left}
+    return sum(pace[stage] * seconds for stage, seconds in left.items()) / cores
 
 
 def _finished(run: AnyRun, folder: Path) -> RunStatus:
     try:
-        seconds = float(storage.read_json(folder / "provenance.json")["cost"]["wall_seconds"])
+        seconds = float(storage.read_json(folder / "provenance.json")["cost"]["cpu_seconds"])
         gate = storage.read_json(folder / "gate.json") if "gate.json" in OUTPUTS[run.stage] else {}
         return RunStatus(run, DONE, gate.get("passed"), seconds)
     except (UserError, KeyError, TypeError, ValueError, AttributeError) as error:
