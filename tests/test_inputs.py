@@ -230,7 +230,7 @@ def test_in_the_checkout_the_advice_is_short(monkeypatch: pytest.MonkeyPatch, ch
     assert snakemake_command(given, "table_2") == "snakemake --cores 2 table_2 with the configuration of --settings"
 
 
-@pytest.mark.parametrize("verb", ["reward-quality", "diagnostics"])
+@pytest.mark.parametrize("verb", ["reward-quality", "reward-preference", "diagnostics"])
 def test_a_summary_of_nothing_says_so(verb: str, capsys: pytest.CaptureFixture[str], here: Path) -> None:
     assert cli.main([verb, "--partial"]) == 0
     assert list(here.rglob("*.csv"))

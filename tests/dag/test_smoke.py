@@ -12,6 +12,7 @@ import torch
 from mtcsirl import cli
 from mtcsirl.episodes.policy import load_policy
 from mtcsirl.files import storage
+from mtcsirl.results.preference import BEHAVIOURS
 from mtcsirl.rewards.learned import load_learned_reward
 from mtcsirl.settings import Settings
 from mtcsirl.study.design import ARTEFACTS, design
@@ -275,6 +276,17 @@ def test_every_irl_run_is_drawn_and_diagnosed(
         found = per_run[(run.experiment, run.method, run.cs_reward, run.source, run.seed)]
         assert found == discriminators * len(run.members)
     assert NOTE in (results / "diagnostics/diagnostics.md").read_text()
+
+
+def test_every_new_agent_is_held_against_its_expert(
+    smoke: Path, snakemake: Snakemake, results: Path, study: Runs
+) -> None:
+    done = snakemake("--cores", "2", "reward_preference", *SMOKE)
+    assert done.returncode == 0, done.stderr[-3000:]
+    rows = pd.read_csv(results / "reward_preference/reward_preference.csv")
+    assert rows["behaviour"].value_counts().to_dict() == dict.fromkeys(BEHAVIOURS, len(study.transfers))
+    assert rows[["r_task", "f", "paid", "paid_from_start"]].notna().all(axis=None)
+    assert NOTE in (results / "reward_preference/reward_preference.md").read_text()
 
 
 def test_snakemakes_own_report(smoke: Path, snakemake: Snakemake, tmp_path: Path) -> None:

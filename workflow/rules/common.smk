@@ -51,7 +51,7 @@ except UserError as error:
 STUDY = design(SETTINGS)
 RUNS = {run.folder: run for name in (None, *ABLATIONS) for run in design(SETTINGS, name)}
 MADE = settle(RUNS.values(), SETTINGS, mark=workflow.is_main_process)
-PAGES = [*ARTEFACTS, CLAIMS, *ABLATIONS, "report", "reward_quality", "diagnostics", "validation"]
+PAGES = [*ARTEFACTS, CLAIMS, *ABLATIONS, "report", "reward_quality", "reward_preference", "diagnostics", "validation"]
 MADE_PAGES = settle_artefacts(PAGES, SETTINGS, mark=workflow.is_main_process)
 RATES = load_rates()
 RESULTS = SETTINGS.results

@@ -11,7 +11,7 @@ from mtcsirl.settings import Settings
 from mtcsirl.study.ablations import ABLATIONS
 from mtcsirl.study.artefacts import HEAT_MAPS, not_rendered, sign_artefact, unsign_artefact
 from mtcsirl.study.design import ARTEFACTS, CLAIMS, design
-from mtcsirl.study.runs import IrlRun, Score
+from mtcsirl.study.runs import AnyRun
 from mtcsirl.study.standing import DONE, standing
 
 if TYPE_CHECKING:
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from mtcsirl.claims.claims import Finding
 
-Kind = TypeVar("Kind", IrlRun, Score)
+Kind = TypeVar("Kind", bound=AnyRun)
 
 
 def register(verbs: Verbs) -> None:
@@ -44,6 +44,13 @@ def register(verbs: Verbs) -> None:
         _reward_quality,
         does="hold every learned reward that was scored against the truth, over seeds",
         writes="reward_quality.csv, .md",
+    )
+    _add(
+        verbs,
+        "reward-preference",
+        _reward_preference,
+        does="say whether learned rewards pay new agents more than experts, and for what",
+        writes="reward_preference.csv, .md",
     )
     _add(
         verbs,
@@ -165,10 +172,21 @@ def _reward_quality(parsed: argparse.Namespace) -> None:
     settings = study_settings(parsed)
     runs = _there(design(settings).scores, settings, parsed.partial)
     rows = read_quality(runs, settings.results, settings.score.bootstrap)
-    text = quality_markdown(rows, " ".join(scale_notes(settings.scale)))
-    home = Path(settings.results) / "scores"
-    _write_summary((parsed.output or home) / "reward_quality", rows, text)
-    _sign(parsed, settings, "reward_quality", home, parsed.output or home)
+    _write_summary(parsed, settings, "scores", rows, quality_markdown(rows, " ".join(scale_notes(settings.scale))))
+
+
+def _reward_preference(parsed: argparse.Namespace) -> None:
+    from mtcsirl.results.notes import scale_notes
+    from mtcsirl.results.preference import preferences_markdown, read_preferences
+
+    settings = study_settings(parsed)
+    study = design(settings)
+    runs = _there(study.transfers, settings, parsed.partial)
+    experts = _there(study.experts, settings, parsed.partial)
+    baselines = _there(study.baselines, settings, parsed.partial)
+    rows = read_preferences(runs, experts, baselines, settings)
+    text = preferences_markdown(rows, " ".join(scale_notes(settings.scale)))
+    _write_summary(parsed, settings, "reward_preference", rows, text)
 
 
 def _diagnostics(parsed: argparse.Namespace) -> None:
@@ -176,12 +194,8 @@ def _diagnostics(parsed: argparse.Namespace) -> None:
     from mtcsirl.results.notes import scale_notes
 
     settings = study_settings(parsed)
-    runs = _there(design(settings).irl_runs, settings, parsed.partial)
-    rows = read_diagnoses(runs, settings.results)
-    text = diagnoses_markdown(rows, scale_notes(settings.scale))
-    home = Path(settings.results) / "diagnostics"
-    _write_summary((parsed.output or home) / "diagnostics", rows, text)
-    _sign(parsed, settings, "diagnostics", home, parsed.output or home)
+    rows = read_diagnoses(_there(design(settings).irl_runs, settings, parsed.partial), settings.results)
+    _write_summary(parsed, settings, "diagnostics", rows, diagnoses_markdown(rows, scale_notes(settings.scale)))
 
 
 def _there(runs: tuple[Kind, ...], settings: Settings, partial: bool) -> tuple[Kind, ...]:
@@ -189,12 +203,16 @@ def _there(runs: tuple[Kind, ...], settings: Settings, partial: bool) -> tuple[K
     return tuple(run for run in runs if not partial or standing(run, settings).state == DONE)
 
 
-def _write_summary(path: Path, rows: "pd.DataFrame", text: str) -> None:
-    """Write rows as ``path``.csv and ``text`` as ``path``.md, and print it."""
+def _write_summary(parsed: argparse.Namespace, settings: Settings, place: str, rows: "pd.DataFrame", text: str) -> None:
+    """Write rows as CSV and ``text`` as Markdown, into ``place`` below the results or --output, and print it."""
     from mtcsirl.files.storage import write_csv, write_text
 
-    write_csv(path.with_suffix(".csv"), rows)
-    write_text(path.with_suffix(".md"), text)
+    name = _target(parsed)
+    home = Path(settings.results) / place
+    folder = parsed.output or home
+    write_csv(folder / f"{name}.csv", rows)
+    write_text(folder / f"{name}.md", text)
+    _sign(parsed, settings, name, home, folder)
     print(text)
 
 

@@ -42,6 +42,7 @@ OTHERS: Mapping[str, tuple[str, ...]] = {
     CLAIMS: ("claims.claims", "figures.claims", "results.rows"),
     "report": ("report.collect", "report.page"),
     "reward_quality": ("results.reward_quality",),
+    "reward_preference": ("results.preference",),
     "diagnostics": ("results.diagnosis",),
     "validation": ("validation.recovery", "validation.figure", "irl.methods.mt_csirl"),
 }
@@ -66,7 +67,7 @@ def artefact_identity(name: str, settings: Settings) -> Identity:
     elif name == "validation":
         return Identity(name, {}, {}, artefact_code(*modules_of(name)), {})
     else:
-        whole = None if name in ("reward_quality", "diagnostics") else name
+        whole = None if name in OTHERS and name != CLAIMS else name
         inputs = {run.folder: identity_of(run, settings).hash for run in design(settings, whole)}
     said = {key: value for key, value in identifying(settings).items() if key not in PLACES}
     if name.startswith("figure_") and not inputs:
