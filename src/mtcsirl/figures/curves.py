@@ -14,9 +14,12 @@ from mtcsirl.figures.style import (
     TARGET_COLOUR,
     Look,
     empty_panel,
+    letter,
+    panel_title,
     quantity,
     quantity_label,
     step_axis,
+    target_of,
 )
 from mtcsirl.results.statistics import summarise, t_interval
 
@@ -69,6 +72,18 @@ def summarise_curve(rows: pd.DataFrame, bins: int = BINS) -> pd.DataFrame:
             "n": [summary.n for summary in summaries],
         }
     )
+
+
+def curve_panel(axes: Axes, index: int, metric: str, series: Sequence[Series], success: Sequence[Series]) -> list[str]:
+    """Draw the curves of ``metric`` as the panel with this place, titled; return what stands of it below the figure.
+
+    ``success``: the same agents' rows of success.
+    """
+    target = target_of(metric)
+    draw_curves(axes, series, metric, target)
+    panel_title(axes, index, curve_title(metric, target, series))
+    notes = missing_note(series) + tasks_note(series) + success_note(success)
+    return [f"({letter(index)}) {note}" for note in notes]
 
 
 def draw_curves(axes: Axes, series: Sequence[Series], metric: str, target: float | None) -> None:

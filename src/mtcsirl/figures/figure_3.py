@@ -3,26 +3,18 @@
 from matplotlib.figure import Figure
 
 from mtcsirl.figures import multi_task
-from mtcsirl.figures.curves import (
-    add_legend,
-    counts,
-    curve_title,
-    draw_curves,
-    missing_note,
-    success_note,
-    tasks_note,
-)
+from mtcsirl.figures.curves import add_legend, counts, curve_panel
 from mtcsirl.figures.data import FigureData
 from mtcsirl.figures.scatter import draw_scatter, scatter_caption
 from mtcsirl.figures.style import (
     TEXT_WIDTH,
     add_notes,
+    letter,
     new_figure,
     panel_title,
     quantity,
     scale_notes,
     styled,
-    target_of,
 )
 
 TITLE = "Ground-truth cs-reward on unseen tasks"
@@ -37,12 +29,8 @@ def draw(data: FigureData) -> Figure:
     axes = figure.subplots(1, len(metrics) + 1, squeeze=False)[0]
     notes: list[str] = []
     for index, metric in enumerate(metrics):
-        series = multi_task.curve_series(data, metric)
-        draw_curves(axes[index], series, metric, target_of(metric))
-        panel_title(axes[index], index, curve_title(metric, target_of(metric), series))
-        success = success_note(multi_task.curve_series(data, metric, "success"))
-        own = missing_note(series) + tasks_note(series) + success
-        notes += [f"({chr(ord('a') + index)}) {note}" for note in own]
+        series, success = (multi_task.curve_series(data, metric, shown) for shown in ("", "success"))
+        notes += curve_panel(axes[index], index, metric, series, success)
     panel_title(axes[-1], len(metrics), "Rewards' correlation")
     draw_scatter(axes[-1], multi_task.correlation(data, _SCATTER), multi_task.METHOD, _SCATTER)
     add_legend(figure, list(axes[:-1]))
@@ -53,7 +41,7 @@ def draw(data: FigureData) -> Figure:
 def caption(data: FigureData) -> str:
     """What the figure shows."""
     metrics = data.cs_rewards
-    letters = ", ".join(f"({chr(ord('a') + index)}) {quantity(metric)}" for index, metric in enumerate(metrics))
+    letters = ", ".join(f"({letter(index)}) {quantity(metric)}" for index, metric in enumerate(metrics))
     numbers = "; ".join(f"{quantity(metric)}: {counts(multi_task.curve_series(data, metric))}" for metric in metrics)
     found = multi_task.correlation(data, _SCATTER)
     return (
@@ -63,7 +51,7 @@ def caption(data: FigureData) -> str:
         "stochastic policy. Red line: target. Lines and bands: mean and 95 % t-interval over seeds "
         f"({numbers}); bands are cut off at the frame, curves end where the shortest run does. "
         "Success below the panels: of training episodes in the last tenth of each agent's steps. "
-        f"({chr(ord('a') + len(metrics))}) {scatter_caption(found, _SCATTER)} "
+        f"({letter(len(metrics))}) {scatter_caption(found, _SCATTER)} "
         f"Scored on {data.settings.multi_task.unseen_tasks[0]}."
     )
 

@@ -3,28 +3,20 @@
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from mtcsirl.figures.curves import (
-    Series,
-    add_legend,
-    counts,
-    curve_title,
-    draw_curves,
-    missing_note,
-    success_note,
-)
+from mtcsirl.figures.curves import Series, add_legend, counts, curve_panel
 from mtcsirl.figures.data import FigureData, rows_where
 from mtcsirl.figures.scatter import Correlation, draw_scatter, scatter_caption, select_correlation
 from mtcsirl.figures.style import (
     LOOKS,
     TEXT_WIDTH,
     add_notes,
+    letter,
     look,
     new_figure,
     panel_title,
     quantity,
     scale_notes,
     styled,
-    target_of,
 )
 from mtcsirl.names import EVALUATION_TARGET
 from mtcsirl.settings.runs import irl_run
@@ -86,12 +78,9 @@ def draw(data: FigureData, artefact: str, task: str, metrics: list[str], *, scat
     axes = figure.subplots(1, panels, squeeze=False)[0]
     notes: list[str] = []
     for index, metric in enumerate(metrics):
-        series = curve_series(data, artefact, task, metric)
-        draw_curves(axes[index], series, metric, target_of(metric))
+        series, success = (curve_series(data, artefact, task, metric, shown) for shown in ("", "success"))
+        notes += curve_panel(axes[index], index, metric, series, success)
         _mark_warm_up(axes[index], warm_up_steps(data, task))
-        panel_title(axes[index], index, curve_title(metric, target_of(metric), series))
-        success = success_note(curve_series(data, artefact, task, metric, "success"))
-        notes += [f"({chr(ord('a') + index)}) {note}" for note in missing_note(series) + success]
     if scatter:
         panel_title(axes[-1], panels - 1, "Rewards' correlation")
         method = data.settings.single_target.method
@@ -103,7 +92,7 @@ def draw(data: FigureData, artefact: str, task: str, metrics: list[str], *, scat
 
 def caption(data: FigureData, artefact: str, task: str, metrics: list[str], *, scatter: bool = False) -> str:
     """What the figure shows, with n, interval and transition set."""
-    letters = ", ".join(f"({chr(ord('a') + index)}) {quantity(metric)}" for index, metric in enumerate(metrics))
+    letters = ", ".join(f"({letter(index)}) {quantity(metric)}" for index, metric in enumerate(metrics))
     numbers = "; ".join(
         f"{quantity(metric)}: {counts(curve_series(data, artefact, task, metric))}" for metric in metrics
     )
@@ -120,7 +109,7 @@ def caption(data: FigureData, artefact: str, task: str, metrics: list[str], *, s
         text += f" IRL starts after {warm_up:,} steps on r_task alone (dotted line)."
     if scatter:
         found = correlation(data, task, SCATTER_CS_REWARD)
-        text += f" ({chr(ord('a') + len(metrics))}) {scatter_caption(found, SCATTER_CS_REWARD)}"
+        text += f" ({letter(len(metrics))}) {scatter_caption(found, SCATTER_CS_REWARD)}"
     return text
 
 

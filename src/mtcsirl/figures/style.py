@@ -149,6 +149,11 @@ def empty_panel(axes: Axes, reason: str) -> None:
     axes.text(0.5, 0.5, reason, transform=axes.transAxes, ha="center", va="center", color=NOTE_COLOUR)
 
 
+def letter(index: int) -> str:
+    """How the paper counts panels: a, b, c."""
+    return chr(ord("a") + index)
+
+
 def panel_title(axes: Axes, index: int, text: str) -> None:
     """Title of a panel as the paper counts them: (a), (b), (c)."""
-    axes.set_title(f"({chr(ord('a') + index)}) {text}", loc="left")
+    axes.set_title(f"({letter(index)}) {text}", loc="left")
