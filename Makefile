@@ -36,20 +36,21 @@ REFERENCE := build/reference
 STUDY :=
 # the runs that the archive must hold, as the README says
 RUNS = $(shell sed -n 's/.*[^0-9,]\([0-9,]*\) of its [0-9,]* runs.*/\1/p' README.md | head -1 | tr -d ,)
-COMMITTED = git ls-files results/reference paper_figs | grep -v -e '/part-' -e 'README.md$$'
+COMMITTED = git ls-files results/reference paper_figs docs/results.md | grep -v -e '/part-' -e 'README.md$$'
 WITHIN = $(STUDY) --set results=$(REFERENCE)/results/reference --set figures=$(REFERENCE)/paper_figs
 SHOWN := claims $(addprefix figure-,2 3 4 5 6 7 s1 s2 1 8 9) $(addprefix table-,1 2 3 4 5)
 
 .PHONY: reference
-reference: setup  ## from the committed archive, without training: every table, figure, verdict and the report, as committed
+reference: setup  ## from the committed archive, without training: every table, figure, verdict and page, as committed
 	@{ $(COMMITTED); } > /dev/null 2>&1 \
-	    || { echo "make reference: git names no committed figure to compare with; clone the repository with git" >&2; exit 1; }
-	@gone=$$(git ls-files --deleted results/reference paper_figs) && [ -z "$$gone" ] \
+	    || { echo "make reference: git names nothing committed to compare with; clone the repository with git" >&2; exit 1; }
+	@gone=$$(git ls-files --deleted results/reference paper_figs docs/results.md) && [ -z "$$gone" ] \
 	    || { echo "make reference: lost:" $$gone "(git checkout brings it back)" >&2; exit 1; }
 	mtcsirl archive verify --archive $(ARCHIVE) --runs $(RUNS)
 	rm -rf $(REFERENCE)
 	mtcsirl archive unpack --archive $(ARCHIVE) $(WITHIN)
-	printf '%s\n' $(SHOWN) | tr - ' ' | xargs -P $(CORES) -I '{}' sh -c 'mtcsirl {} --partial $(WITHIN) > /dev/null'
+	{ echo "results --output $(REFERENCE)/docs"; printf '%s\n' $(SHOWN) | tr - ' '; } \
+	    | xargs -P $(CORES) -I '{}' sh -c 'mtcsirl {} --partial $(WITHIN) > /dev/null'
 	mtcsirl report --partial $(WITHIN)
 	$(COMMITTED) | while read -r file; do cmp "$$file" "$(REFERENCE)/$$file" || exit 1; done
 

@@ -12,7 +12,8 @@ import pandas as pd
 from mtcsirl.files import storage
 from mtcsirl.files.identity import FILE, Record, checksums, dumps, result_files
 from mtcsirl.names import DIVERGED, KEPT, distance_metric
-from mtcsirl.results.rows import KEY, OK, POLICIES, ROW_COLUMNS, agents, metrics, run_key
+from mtcsirl.results.agents import agents, run_key
+from mtcsirl.results.rows import KEY, OK, POLICIES, ROW_COLUMNS, metrics
 from mtcsirl.rewards.ground_truth import COMMON_SENSE_REWARDS
 from mtcsirl.settings import Settings
 from mtcsirl.study.keys import identity_of

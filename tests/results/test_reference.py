@@ -62,7 +62,7 @@ def test_make_reference_fails_where_git_names_nothing_to_compare_with(tmp_path, 
         subprocess.run(["git", "init", "--quiet"], cwd=tmp_path, check=True)
     done = _reference(_checkout(tmp_path))
     assert done.returncode != 0
-    assert "git names no committed figure to compare with; clone the repository with git" in done.stderr
+    assert "git names nothing committed to compare with; clone the repository with git" in done.stderr
     assert "fatal" not in done.stderr
     assert not (tmp_path / "mirror").exists()
 

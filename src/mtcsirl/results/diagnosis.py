@@ -21,7 +21,7 @@ import pandas as pd
 from mtcsirl.errors import UserError
 from mtcsirl.files import storage
 from mtcsirl.names import DIAGNOSTIC_COLUMNS
-from mtcsirl.results.rows import run_key
+from mtcsirl.results.agents import run_key
 from mtcsirl.study.runs import IrlRun
 
 SATURATED, BLIND = 0.99, 0.55

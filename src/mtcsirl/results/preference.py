@@ -19,7 +19,7 @@ import pandas as pd
 
 from mtcsirl.episodes.demonstrations import as_transitions, collect_demonstrations, demonstrated, whole_episodes
 from mtcsirl.episodes.policy import load_policy
-from mtcsirl.results.rows import run_key
+from mtcsirl.results.agents import run_key
 from mtcsirl.results.statistics import summarise, t_interval
 from mtcsirl.rewards.learned import LearnedReward, check_learned, load_learned_reward
 from mtcsirl.settings import Settings

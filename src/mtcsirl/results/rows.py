@@ -4,9 +4,11 @@
 status. No row is dropped: a run that the study asks for and that is not there stands in the frame with value NaN.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from itertools import product
 from pathlib import Path
-from typing import Any
+from types import MappingProxyType
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -14,11 +16,12 @@ import pandas as pd
 from mtcsirl.errors import MissingError, UserError
 from mtcsirl.files import storage
 from mtcsirl.names import CS_REWARDS, DIVERGED, KEPT, LAST, distance_metric
+from mtcsirl.results.agents import agents, run_key
 from mtcsirl.results.completeness import POLICIES, what_lacks
 from mtcsirl.results.points import read_points
 from mtcsirl.settings import Settings
 from mtcsirl.study import standing as standings
-from mtcsirl.study.runs import AnyRun, Baseline, Demonstrations, Expert, IrlRun, Runs, Transfer
+from mtcsirl.study.runs import AnyRun, Baseline, Demonstrations, Expert, Runs
 from mtcsirl.study.standing import DONE, standing
 
 KEY = ("stage", "experiment", "method", "cs_reward", "source", "task", "target", "seed")
@@ -51,7 +54,7 @@ def evaluation_rows(study: Runs, settings: Settings, *, partial: bool = False, k
     Raises:
         UserError: a run is missing or stale and ``partial`` is false; a file is unreadable.
     """
-    frames = []
+    found: list[dict[str, Any]] = []
     names, asked = metrics(study), settings.evaluation.episodes
     for run in study:
         if kept == LAST and not isinstance(run, Expert | Baseline):
@@ -59,14 +62,12 @@ def evaluation_rows(study: Runs, settings: Settings, *, partial: bool = False, k
         status, why = _standing(run, settings, partial)
         folder = Path(settings.results) / run.folder
         for agent in agents(run):
-            if status:
-                frames.append(_unusable(agent, folder, names, kept, status, why))
-            else:
-                frames.append(_agent_rows(agent, folder, names, asked, kept))
+            evaluated = _Evaluated(status, why) if status else _evaluated(agent, folder, names, asked, kept)
+            found += _agent_rows(agent, folder, names, kept, evaluated)
         if kept == KEPT and isinstance(run, Demonstrations):
-            frames.append(_demonstration_rows(run, folder, status, why))
-    rows = pd.concat(frames, ignore_index=True) if frames else pd.DataFrame({name: [] for name in ROW_COLUMNS})
-    return _mark_equal_seeds(rows[list(ROW_COLUMNS)])
+            found += _demonstration_rows(run, folder, status, why)
+    rows = pd.DataFrame(found, columns=list(ROW_COLUMNS))
+    return _mark_equal_seeds(rows)
 
 
 def last_rows(study: Runs, settings: Settings, *, partial: bool = False) -> pd.DataFrame:
@@ -145,28 +146,6 @@ def matrix(rows: pd.DataFrame) -> pd.DataFrame:
     return rows.pivot(index="seed", columns="task", values="value").astype(float)
 
 
-def agents(run: AnyRun) -> Iterator[dict[str, Any]]:
-    """The ``KEY`` of each agent that ``run`` evaluates."""
-    key = run_key(run)
-    if isinstance(run, IrlRun):
-        for task, target in run.members:
-            yield key | {"task": task, "target": target, "seed": run.seed}
-    elif isinstance(run, Expert | Baseline | Transfer):
-        yield key | {"task": run.task, "target": run.target, "seed": run.seed}
-
-
-def run_key(run: AnyRun) -> dict[str, Any]:
-    """The part of ``KEY`` that all agents of ``run`` share; a variant's experiment is its name, as ``ablation_x/y``."""
-    irl = run.irl if isinstance(run, Transfer) else run if isinstance(run, IrlRun) else None
-    return {
-        "stage": run.stage,
-        "experiment": (run.key["variant"].removeprefix("ablations/").rstrip("/") or irl.experiment) if irl else "",
-        "method": irl.method if irl else "",
-        "cs_reward": irl.cs_reward if irl else getattr(run, "cs_reward", ""),
-        "source": irl.source if irl else "",
-    }
-
-
 def metrics(study: Runs) -> tuple[str, ...]:
     """What is read of an evaluation: success, mean and distance of cs-rewards, task reward.
 
@@ -176,52 +155,70 @@ def metrics(study: Runs) -> tuple[str, ...]:
     return ("success", *used, *(distance_metric(name) for name in used), "task_reward")
 
 
-def _agent_rows(agent: dict[str, Any], folder: Path, names: tuple[str, ...], asked: int, kept: str) -> pd.DataFrame:
-    """One row per policy and metric of one agent."""
-    grid = pd.MultiIndex.from_product([POLICIES, names], names=["policy", "metric"])
-    rows = pd.DataFrame({"value": np.nan, "episodes": 0, "diverged": 0}, index=grid)
-    status, lacks = MISSING, ""
+class _Evaluated(NamedTuple):
+    """What an agent's episodes say."""
+
+    status: str
+    lacks: str = ""
+    episodes: Mapping[tuple[str, str], int] = MappingProxyType({})
+    """By policy and metric, as the next one."""
+    means: Mapping[tuple[str, str], float] = MappingProxyType({})
+    """Of usable agents alone."""
+    diverged: Mapping[str, int] = MappingProxyType({})
+    """By policy."""
+
+
+def _evaluated(agent: dict[str, Any], folder: Path, names: tuple[str, ...], asked: int, kept: str) -> _Evaluated:
+    """The evaluation of one agent of the run in ``folder``."""
     path = folder / "evaluation.csv"
-    if path.is_file():
-        episodes = storage.read_csv(path, EVALUATION_COLUMNS)
-        own = episodes[(episodes["task"] == agent["task"]) & (episodes["target"] == agent["target"])]
-        chosen = own[own["kept"] == kept]
-        lacks = what_lacks(chosen, (*names, DIVERGED), asked)
-        status, lacks = _status(agent, own, lacks if len(own) or episodes.empty else "", folder, kept)
-        groups = chosen.groupby(["policy", "metric"])["value"]
-        rows["episodes"] = groups.size().reindex(grid, fill_value=0)
-        if status in (OK, BELOW_GATE):
-            rows["value"] = groups.mean().reindex(grid)
-            diverged = {policy: int(groups.get_group((policy, DIVERGED)).sum()) for policy in POLICIES}
-            rows["diverged"] = rows.index.get_level_values("policy").map(diverged)
-    return rows.reset_index().assign(**agent, kept=kept, status=status, lacks=lacks, folder=str(folder))
+    if not path.is_file():
+        return _Evaluated(MISSING)
+    episodes = storage.read_csv(path, EVALUATION_COLUMNS)
+    own = episodes[(episodes["task"] == agent["task"]) & (episodes["target"] == agent["target"])]
+    chosen = own[own["kept"] == kept]
+    lacks = what_lacks(chosen, (*names, DIVERGED), asked)
+    status, lacks = _status(agent, own, lacks if len(own) or episodes.empty else "", folder, kept)
+    groups = chosen.groupby(["policy", "metric"])["value"]
+    sizes = groups.size().to_dict()
+    if status not in (OK, BELOW_GATE):
+        return _Evaluated(status, lacks, sizes)
+    total = groups.sum()
+    return _Evaluated(
+        status, lacks, sizes, groups.mean().to_dict(), {policy: int(total[policy, DIVERGED]) for policy in POLICIES}
+    )
 
 
-def _unusable(
-    agent: dict[str, Any], folder: Path, names: tuple[str, ...], kept: str, status: str, why: str
-) -> pd.DataFrame:
-    """The rows of an agent without usable numbers."""
-    grid = pd.MultiIndex.from_product([POLICIES, names], names=["policy", "metric"])
-    rows = pd.DataFrame({"value": np.nan, "episodes": 0, "diverged": 0}, index=grid)
-    return rows.reset_index().assign(**agent, kept=kept, status=status, lacks=why, folder=str(folder))
+def _agent_rows(
+    agent: dict[str, Any], folder: Path, names: tuple[str, ...], kept: str, evaluated: _Evaluated
+) -> Iterator[dict[str, Any]]:
+    """One row per policy and metric of one agent."""
+    marks = {"kept": kept, "status": evaluated.status, "lacks": evaluated.lacks, "folder": str(folder)}
+    for policy, metric in product(POLICIES, names):
+        yield (
+            agent
+            | marks
+            | {
+                "policy": policy,
+                "metric": metric,
+                "value": evaluated.means.get((policy, metric), np.nan),
+                "episodes": evaluated.episodes.get((policy, metric), 0),
+                "diverged": evaluated.diverged.get(policy, 0),
+            }
+        )
 
 
-def _demonstration_rows(run: Demonstrations, folder: Path, status: str, why: str) -> pd.DataFrame:
+def _demonstration_rows(run: Demonstrations, folder: Path, status: str, why: str) -> Iterator[dict[str, Any]]:
     """Success and metric of one expert's demonstrations."""
-    verdict: dict[str, Any] = {"success": np.nan, "metric": np.nan}
+    verdict: dict[str, Any] = {}
     if not status:
         verdict = _verdict(folder / "gate.json")
         status = OK if verdict["passed"] else BELOW_GATE
     key = run_key(run) | {"task": run.task, "target": run.target, "seed": run.expert.seed}
-    rows = pd.DataFrame(
-        {
-            "policy": "stochastic",
-            "metric": ["success", run.cs_reward],
-            "value": np.array([verdict["success"], verdict["metric"]], dtype=float),  # None, which is no number: NaN
-        }
-    )
-    marks: dict[str, Any] = {"episodes": 0, "diverged": int(verdict.get("diverged", 0)), "status": status, "lacks": why}
-    return rows.assign(**key, **marks, kept=KEPT, folder=str(folder))
+    marks = {"policy": "stochastic", "kept": KEPT, "status": status, "lacks": why, "folder": str(folder)}
+    counts = {"episodes": 0, "diverged": int(verdict.get("diverged", 0))}
+    for metric, said in (("success", "success"), (run.cs_reward, "metric")):
+        value = verdict.get(said)  # None, which is no number, is NaN
+        yield key | marks | counts | {"metric": metric, "value": np.nan if value is None else float(value)}
 
 
 def _status(agent: dict[str, Any], own: pd.DataFrame, lacks: str, folder: Path, kept: str) -> tuple[str, str]:
