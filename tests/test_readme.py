@@ -95,3 +95,34 @@ def test_a_changed_number_is_noticed(checkout: Path, changed: tuple[str, str]) -
 def test_a_changed_correlation_is_noticed(checkout: Path, changed: tuple[str, str]) -> None:
     text = (checkout / "README.md").read_text(encoding="utf-8").replace(*changed, 1)
     assert correlations(text) != correlations_from_archive(checkout / "results" / "reference")
+
+
+def said_of_claims(text: str) -> dict[str, str]:
+    """The verdict in slanted letters after "C7 is", by claim."""
+    return dict(re.findall(r"\b(C\d+) is \*([a-z ]+)\*", " ".join(text.split())))
+
+
+def judged(page: str) -> dict[str, str]:
+    """The verdict of each claim in docs/results.md, which `make reference` holds against the archive."""
+    return dict(re.findall(r"^\| (C\d+)[^|]*\|.*?\| \*\*([a-z ]+)\*\* \|", page, re.MULTILINE))
+
+
+def test_its_verdicts_are_those_of_the_results_page(checkout: Path) -> None:
+    text = (checkout / "README.md").read_text(encoding="utf-8")
+    page = (checkout / "docs" / "results.md").read_text(encoding="utf-8")
+    assert said_of_claims(text).items() <= judged(page).items()
+    assert said_of_claims(text), "it says what was found"
+    experts = re.search(r"(\d+ of \d+) experts pass", " ".join(text.split()))
+    assert experts is None or f"{experts[1]} experts passed their gate" in page
+
+
+def test_another_verdict_is_noticed(checkout: Path) -> None:
+    page = (checkout / "docs" / "results.md").read_text(encoding="utf-8")
+    assert not said_of_claims("C1 is\n*reproduced* (8 met)").items() <= judged(page).items()
+
+
+def test_the_share_of_successes_is_the_archives(checkout: Path) -> None:
+    text = " ".join((checkout / "README.md").read_text(encoding="utf-8").split())
+    rows = from_archive(checkout / "results" / "reference")
+    velocity, norm = (100 * np.mean([float(rows[task][column]) for task in UNSEEN]) for column in (1, 3))
+    assert f"they succeed in {velocity:.0f} and {norm:.0f} % of their episodes" in text
