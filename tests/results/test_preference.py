@@ -98,6 +98,21 @@ def test_a_reward_for_what_new_agents_do_prefers_them(tmp_path: Path) -> None:
     assert "2 of 2 | 2 of 2 |" in preferences_markdown(rows)
 
 
+@pytest.mark.parametrize(
+    ("new", "expert", "even"),
+    [((6.5, -9.0), (9.6, -17.6), 0.36), ((9.0, -1.0), (8.0, -2.0), np.nan), ((8.0, -2.0), (8.0, -1.0), np.nan)],
+)
+def test_where_task_and_behaviour_are_even(new: tuple[float, float], expert: tuple[float, float], even: float) -> None:
+    key = {"experiment": "multi_task", "method": "m", "cs_reward": "c", "source": "all", "task": "reach", "target": 0}
+    rows = pd.DataFrame(
+        key
+        | {"seed": 0, "behaviour": name, "r_task": r, "f": f, "paid": r + f, "paid_from_start": r + f, "success": 1.0}
+        for name, (r, f) in ((NEW, new), (EXPERT, expert))
+    )
+    (found,) = preferences(rows).to_dict("records")
+    assert found["even_at"] == pytest.approx(even, abs=0.005, nan_ok=True)
+
+
 def test_a_reward_for_what_experts_do_does_not(tmp_path: Path) -> None:
     study, at = write(tmp_path, weight=-1.0)
     (found,) = preferences(rows_of(study, at, of(study))).to_dict("records")

@@ -107,6 +107,8 @@ def preferences(rows: pd.DataFrame) -> pd.DataFrame:
 
     ``beyond``: paid to the new agent less paid to the expert of its seed, mean with t-interval; ``prefers`` of ``n``
     agents earn more than their expert, ``prefers_from_start`` do from resets. Agents without an expert do not count.
+    ``even_at``: at this part of lambda the two behaviours would earn the same; below it the one with more r_task earns
+    more, if agents on that weight kept to these two, which they need not.
     """
     return pd.DataFrame(list(_preferred(rows)))
 
@@ -123,7 +125,14 @@ def _preferred(rows: pd.DataFrame) -> Iterator[dict[str, Any]]:
         named = dict(zip(KEY, key, strict=True))
         means = {f"{part} {name}": own[part].mean() for name, own in by.items() for part in VALUES}
         verdict = {"beyond": summary.mean, "low": low, "high": high, "prefers": int((beyond > 0).sum())}
+        verdict["even_at"] = _even_at(*(by[name][["r_task", "f"]].mean() for name in (NEW, EXPERT)))
         yield named | means | verdict | {"prefers_from_start": int((from_start > 0).sum()), "n": len(beyond)}
+
+
+def _even_at(new: pd.Series, expert: pd.Series) -> float:
+    """The part of lambda at which the two means earn the same; NaN where no weight above 0 does that."""
+    task, f = expert["r_task"] - new["r_task"], new["f"] - expert["f"]
+    return float(task / f) if task * f > 0 else np.nan
 
 
 def preferences_markdown(rows: pd.DataFrame, note: str = "") -> str:
@@ -133,14 +142,22 @@ def preferences_markdown(rows: pd.DataFrame, note: str = "") -> str:
         f"and seed, and to plain SAC: {EPISODES} stochastic episodes of each, mean over seeds. Beyond: new agent less",
         "expert [95 % t-interval over seeds]. Prefers: new agents that earn more than their expert, a step and",
         "discounted from resets; of agents that do as experts do, half. Where most do, the reward does not ask for",
-        "what experts do.",
+        "what experts do. Even at: the part of lambda at which both would earn the same.",
         note,
         "",
     ]
     found = preferences(rows)
     if found.empty:
         return "\n".join([*lines, "No new agent has an expert to be held against yet."]) + "\n"
-    head = (*KEY, "success", *(f"r_task, f: {name}" for name in BEHAVIOURS), "beyond", "prefers", "from resets")
+    head = (
+        *KEY,
+        "success",
+        *(f"r_task, f: {name}" for name in BEHAVIOURS),
+        "beyond",
+        "prefers",
+        "from resets",
+        "even at",
+    )
     lines += ["| " + " | ".join(head) + " |", "|" + " --- |" * len(head)]
     lines += ["| " + " | ".join(_cells(row)) + " |" for row in found.to_dict("records")]
     return "\n".join(lines) + "\n"
@@ -155,3 +172,4 @@ def _cells(row: dict[Hashable, Any]) -> Iterator[str]:
     interval = f" [{row['low']:.1f}, {row['high']:.1f}]" if row["n"] > 1 else ""
     yield f"{row['beyond']:.1f}{interval}"
     yield from (f"{row[name]} of {row['n']}" for name in ("prefers", "prefers_from_start"))
+    yield "" if np.isnan(row["even_at"]) else f"{row['even_at']:.2f}"
