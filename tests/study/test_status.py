@@ -61,7 +61,9 @@ def test_on_a_terminal_the_screen_is_cleared_and_ctrl_c_ends_it(settings: Settin
     main, side = pty.openpty()
     command = [sys.executable, "-m", "mtcsirl.cli", "status", "--watch", "1", "--settings", settings.model_dump_json()]
     env = os.environ | {"PYTHONPATH": str(CHECKOUT / "src"), "COLUMNS": "60", "LINES": "20"}
-    watched = subprocess.Popen(command, env=env, stdin=side, stdout=side, stderr=side)
+    # a shell's background jobs ignore Ctrl-C, and what they start inherits that
+    heeding = {"preexec_fn": lambda: signal.signal(signal.SIGINT, signal.default_int_handler)}
+    watched = subprocess.Popen(command, env=env, stdin=side, stdout=side, stderr=side, **heeding)
     os.close(side)
     read = b""
     while read.count(b"\x1b[2J") < 2:
