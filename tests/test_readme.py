@@ -12,12 +12,11 @@ from mtcsirl.results.moments import beyond_task
 from mtcsirl.results.points import EPISODE, without_first
 from mtcsirl.results.statistics import Estimate, mean_correlation
 
-ROWS = {
-    "experts": "expert/{metric}/reach-wall-t0",
-    "generators of IRL": "irl/single_target/mt_csirl/{metric}/reach-wall",
-    "new agents on the learned reward": "transfer/single_target/mt_csirl/{metric}/reach-wall/reach-wall-t0",
-    "SAC": "sac/reach-wall-t0",
+ALONE = {
+    f"{task} alone": f"transfer/single_target/mt_csirl/{{metric}}/{task}/{task}-t0"
+    for task in ("reach-wall", "drawer-close", "button-press-topdown-wall", "push-back", "coffee-button")
 }
+"""The first cell of each row about a reward of one task, and the folders of its new agents."""
 UNSEEN = {
     task: f"transfer/multi_task/mt_csirl/{{metric}}/all/{task}-t0"
     for task in ("reach-wall", "button-press-topdown-wall", "drawer-close", "push-back")
@@ -55,7 +54,7 @@ def correlations_from_archive(archive: Path) -> dict[str, list[str]]:
 def cells(text: str) -> dict[str, list[str]]:
     """The table's rows by their first cell."""
     rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in text.splitlines() if line[:2] == "| "]
-    return {first: rest for first, *rest in rows if first in ROWS | UNSEEN}
+    return {first: rest for first, *rest in rows if first in ALONE | UNSEEN}
 
 
 def correlations(text: str) -> dict[str, list[str]]:
@@ -68,8 +67,8 @@ def from_archive(archive: Path) -> dict[str, list[str]]:
     """What the rows must say: mean over seeds with its t-interval, and mean success, for each cs-reward."""
     rows = read(archive, "evaluation").query("policy == 'stochastic' and kept == 'kept'")
     means = rows.groupby(["folder", "metric"])["value"].mean().unstack()
-    found: dict[str, list[str]] = {name: [] for name in ROWS | UNSEEN}
-    for name, pattern in (ROWS | UNSEEN).items():
+    found: dict[str, list[str]] = {name: [] for name in ALONE | UNSEEN}
+    for name, pattern in (ALONE | UNSEEN).items():
         for metric in ("velocity", "action_norm"):
             own = means[means.index.str.fullmatch(re.escape(pattern.format(metric=metric)) + r"/s\d+")]
             assert len(own) == 5, f"{name}: n = 5"
