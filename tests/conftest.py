@@ -2,6 +2,7 @@
 
 import gc
 import os
+import signal
 from pathlib import Path
 
 # before numpy, whose library reads them when it loads
@@ -19,6 +20,8 @@ from mtcsirl.worlds.drawable import lacking
 from tests.claimed_device import ClaimedGenerator, ClaimedGpu
 
 CHECKOUT = Path(__file__).resolve().parents[1]
+HEEDING = {"preexec_fn": lambda: signal.signal(signal.SIGINT, signal.default_int_handler)}
+"""A process that heeds Ctrl-C: a shell's background jobs ignore it, and what they start inherits that."""
 needs_rendering = pytest.mark.skipif(lacking() is not None, reason=str(lacking()))
 
 

@@ -27,6 +27,7 @@ from mtcsirl.study.plan import cost, plan, wall_hours
 from mtcsirl.study.rates import CALIBRATION, Rates, by_minibatch, load_rates
 from mtcsirl.study.runs import Expert, IrlRun
 from mtcsirl.study.status import DONE, FAILED, RUNNING, STALE, WAITING, run_status, seconds_left, study_status
+from tests.conftest import HEEDING
 
 KEY = ["--task", "reach", "--seed", "0"]
 
@@ -366,9 +367,7 @@ def test_status_verb_on_an_empty_folder(small: Settings, capsys: pytest.CaptureF
 def test_a_stopped_job_leaves_no_half_written_file(tmp_path: Path, number: int, code: int) -> None:
     run = tmp_path / "run"
     command = [sys.executable, "-m", "mtcsirl.cli", "train-sac", *KEY, "--output", str(run), "--set", "steps=1000000"]
-    # a shell's background jobs ignore Ctrl-C, and what they start inherits that
-    heeding = {"preexec_fn": lambda: signal.signal(signal.SIGINT, signal.default_int_handler)}
-    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, **heeding) as job:
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, **HEEDING) as job:
         while not (run / ".lock").exists():
             assert job.poll() is None
             time.sleep(0.05)

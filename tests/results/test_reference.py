@@ -11,6 +11,7 @@ from tests.conftest import CHECKOUT
 
 REFERENCE = CHECKOUT / "results" / "reference"
 MOST = 60 * 2**20
+COMMITTED = ("paper_figs/figure_2.png", "results/reference/part-0001/manifest.json", "docs/results.md")
 committed = pytest.mark.skipif(not parts(REFERENCE), reason="results/reference holds no part yet")
 
 
@@ -43,7 +44,7 @@ def _checkout(folder: Path) -> Path:
     """What `make reference` looks at before any work."""
     for name in ("Makefile", "README.md"):
         shutil.copy(CHECKOUT / name, folder / name)
-    for name in ("paper_figs/figure_2.png", "results/reference/part-0001/manifest.json"):
+    for name in COMMITTED:
         (folder / name).parent.mkdir(parents=True)
         (folder / name).write_text("x")
     return folder
@@ -68,7 +69,7 @@ def test_make_reference_fails_where_git_names_nothing_to_compare_with(tmp_path, 
 
 
 @needs_make
-@pytest.mark.parametrize("lost", ["paper_figs/figure_2.png", "results/reference/part-0001/manifest.json"])
+@pytest.mark.parametrize("lost", COMMITTED)
 def test_make_reference_names_what_is_committed_and_lost(tmp_path, lost):
     _commit(_checkout(tmp_path))
     (tmp_path / lost).unlink()

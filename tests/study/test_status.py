@@ -14,7 +14,7 @@ import pytest
 from mtcsirl.settings import Settings
 from mtcsirl.study.design import design
 from mtcsirl.study.status import before_it_starts
-from tests.conftest import CHECKOUT
+from tests.conftest import CHECKOUT, HEEDING
 from tests.study.made_up import finish
 
 
@@ -61,9 +61,7 @@ def test_on_a_terminal_the_screen_is_cleared_and_ctrl_c_ends_it(settings: Settin
     main, side = pty.openpty()
     command = [sys.executable, "-m", "mtcsirl.cli", "status", "--watch", "1", "--settings", settings.model_dump_json()]
     env = os.environ | {"PYTHONPATH": str(CHECKOUT / "src"), "COLUMNS": "60", "LINES": "20"}
-    # a shell's background jobs ignore Ctrl-C, and what they start inherits that
-    heeding = {"preexec_fn": lambda: signal.signal(signal.SIGINT, signal.default_int_handler)}
-    watched = subprocess.Popen(command, env=env, stdin=side, stdout=side, stderr=side, **heeding)
+    watched = subprocess.Popen(command, env=env, stdin=side, stdout=side, stderr=side, **HEEDING)
     os.close(side)
     read = b""
     while read.count(b"\x1b[2J") < 2:

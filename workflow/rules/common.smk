@@ -22,7 +22,7 @@ from mtcsirl.settings.loading import configured, read_yaml
 from mtcsirl.settings.machine import check_study
 from mtcsirl.settings.template import as_json
 from mtcsirl.study.ablations import ABLATIONS
-from mtcsirl.study.artefacts import HEAT_MAPS, settle_artefacts
+from mtcsirl.study.artefacts import HEAT_MAPS, OTHERS, settle_artefacts
 from mtcsirl.study.design import ARTEFACTS, CLAIMS, design
 from mtcsirl.study.keys import FIELDS
 from mtcsirl.study.plan import plan, request
@@ -51,8 +51,7 @@ except UserError as error:
 STUDY = design(SETTINGS)
 RUNS = {run.folder: run for name in (None, *ABLATIONS) for run in design(SETTINGS, name)}
 MADE = settle(RUNS.values(), SETTINGS, mark=workflow.is_main_process)
-PAGES = [*ARTEFACTS, CLAIMS, *ABLATIONS, "report", "reward_quality", "reward_preference", "diagnostics", "validation"]
-MADE_PAGES = settle_artefacts(PAGES, SETTINGS, mark=workflow.is_main_process)
+MADE_PAGES = settle_artefacts([*ARTEFACTS, *ABLATIONS, *OTHERS], SETTINGS, mark=workflow.is_main_process)
 RATES = load_rates()
 RESULTS = SETTINGS.results
 # plain `snakemake` of a virtual environment that is not activated finds `mtcsirl` beside itself

@@ -58,7 +58,7 @@ def read_preferences(
         key = reward | {"task": run.task, "target": run.target, "seed": run.seed}
         for behaviour, agent in behaviours.items():
             if agent is not None:
-                # what a new agent did is asked for once
+                # what a new agent did is asked for once and need not be kept
                 frame = _acted(agent, settings) if agent is run else acted(agent)
                 rows.append(key | {"behaviour": behaviour} | paid(frame, learned, run, settings))
     return pd.DataFrame(rows, columns=list(COLUMNS))
