@@ -4,7 +4,7 @@ SEEDS = {"seeds": (0, 1), "irl_seeds": (0, 1), "results": "nowhere"}
 OTHER_TASKS = {
     "single_target": {"tasks": ("door-open",)},
     "multi_target": {"tasks": ("door-open",), "train_targets": (1,)},
-    "multi_task": {"train_tasks": ("drawer-open",), "train_targets": (3,), "unseen_tasks": ("door-open",)},
+    "multi_task": {"train_tasks": ("drawer-open", "reach"), "train_targets": (3,), "unseen_tasks": ("door-open",)},
 }
 SUBSETS = {
     "mt_csirl": {"methods": ("mt_csirl",)},

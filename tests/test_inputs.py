@@ -182,7 +182,7 @@ def test_an_experiment_that_the_demonstrations_are_not_is_refused(
     files = []
     for task, target in members:
         files.append(f"{task}{target}.parquet")
-        rows = {name: [0.0] for name in COLUMNS} | {"task": [task], "target": [target]}
+        rows = {name: [0.0] for name in COLUMNS} | {"task": [task], "target": [target], "cs_reward": ["velocity"]}
         storage.write_parquet(here / files[-1], pd.DataFrame(rows))
     assert f"which is {found}" in fails(capsys, *learn_reward(*files), "--output", "run", "--experiment", asked)
     assert not (here / "run").exists()

@@ -11,10 +11,11 @@ from mtcsirl.settings.loading import load
 from mtcsirl.study import readiness
 from mtcsirl.study.design import design
 from mtcsirl.study.rates import load_rates
-from mtcsirl.study.readiness import FAILS, LACKS, OK
+from mtcsirl.study.readiness import BESIDE_RUNS_GIB, FAILS, LACKS, OK
 from mtcsirl.study.runs import AnyRun
 from tests.conftest import CHECKOUT
 from tests.hidden import environment
+from tests.study.made_up import finish
 
 LOOKED_AT = ["python", "memory", "disk", "writing", "rendering", "videos", "threads", "locale", "commit"]
 
@@ -80,6 +81,22 @@ def test_disk_counts_what_is_not_there_yet(left: list[AnyRun], settings: Setting
     assert readiness.disk(left, settings, rates, 50.0).state == OK
     assert readiness.disk(left, settings, rates, 0.11).state == FAILS
     assert readiness.disk([], settings, rates, 0.11).state == OK, "all runs are there"
+
+
+def test_a_stale_run_is_still_to_be_written(settings: Settings, left: list[AnyRun]) -> None:
+    """Of a study that is done all but what tables and figures take is there; made with other steps, nothing is."""
+
+    def said() -> str:
+        found = readiness.findings(design(settings), settings, load_rates(), 1)
+        return next(one.says for one in found if one.what == "disk").partition(", about ")[2]
+
+    nothing_there = said()
+    for run in left:
+        finish(run, settings)
+    assert said() == f"{BESIDE_RUNS_GIB} to be written" != nothing_there
+    for run in left:
+        finish(run, settings, steps=123)
+    assert said() == nothing_there
 
 
 def test_places_that_cannot_be_written(settings: Settings, tmp_path: Path) -> None:

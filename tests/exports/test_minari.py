@@ -96,6 +96,35 @@ def test_a_dataset_that_could_not_be_made_leaves_nothing(demonstrations: Path, t
     assert not list(folder.rglob("*"))
 
 
+FOREIGN = {
+    "no task": ({"task": None}, "column task holds 'None', not a task of Meta-World"),
+    "an unknown task": ({"task": "fly"}, "column task holds 'fly', not a task of Meta-World"),
+    "no target": ({"target": np.nan}, "column target holds 'nan', not a target (0 ... 49)"),
+    "a target too many": ({"target": 50}, "column target holds '50', not a target (0 ... 49)"),
+    "a text as episode": ({"episode": "first"}, "column episode holds 'first', not a whole number"),
+    "a text as success": ({"success": "False"}, "column success holds 'False', not true or false"),
+    "no success": ({"success": None}, "column success holds 'None', not true or false"),
+}
+
+
+@pytest.mark.parametrize("what", FOREIGN)
+def test_demonstrations_of_nothing_known_are_one_line_and_leave_nothing(
+    demonstrations: Path, tmp_path: Path, what: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("MINARI_DATASETS_PATH", "")
+    changes, says = FOREIGN[what]
+    whole = storage.read_parquet(demonstrations)
+    storage.write_parquet(demonstrations, whole.assign(**changes))
+    words = ["export-demonstrations", "--demonstrations", str(demonstrations), "--output", str(tmp_path / "datasets")]
+    assert main(words) == 2
+    error = capsys.readouterr().err
+    assert error.count("\n") == 1
+    assert f"{demonstrations}: {says}; name the file demonstrations.parquet" in error
+    assert not (tmp_path / "datasets").exists()
+    storage.write_parquet(demonstrations, whole.assign(target=3.0, success=whole["success"].astype(float)))
+    assert main(words) == 0, "numbers as a column with gaps has them are read"
+
+
 def test_datasets_below_one_folder_are_all_found(
     demonstrations: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

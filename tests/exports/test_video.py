@@ -2,6 +2,7 @@
 
 import importlib.util
 import re
+import shutil
 
 import numpy as np
 import pandas as pd
@@ -82,6 +83,39 @@ def test_mistakes_are_one_line(folder, changes, words):
     arguments = {"clips": [clip_of(folder)], "output": "film.gif"} | changes
     with pytest.raises(UserError, match=re.escape(words)):
         render_video(arguments.pop("clips"), arguments.pop("output"), **arguments)
+
+
+FOREIGN = {
+    "no row": ({"task": [], "target": []}, "evaluation.csv: has no row; say by --task and --target"),
+    "no target": ({"task": ["reach"], "target": [None]}, "task 'reach', target nan: no such task and target"),
+    "half a target": ({"task": ["reach"], "target": [0.5]}, "target 0.5: no such"),
+    "a target too many": ({"task": ["reach"], "target": [50]}, "target 50: no such"),
+    "a target below": ({"task": ["reach"], "target": [-1]}, "target -1: no such"),
+    "no end": ({"task": ["reach"], "target": ["inf"]}, "target inf: no such"),
+    "no task": ({"task": [""], "target": [1]}, "task '', target 1: no such"),
+    "an unknown task": ({"task": ["fly"], "target": [1]}, "task 'fly', target 1: no such"),
+}
+
+
+@pytest.mark.parametrize("what", FOREIGN)
+def test_an_evaluation_that_names_no_task_and_target_is_one_line(folder, tmp_path, capsys, what):
+    columns, says = FOREIGN[what]
+    own = tmp_path / "own"
+    shutil.copytree(folder, own)
+    pd.DataFrame(columns).to_csv(own / "evaluation.csv", index=False)
+    assert main(["video", str(own), "--output", str(tmp_path / "x.gif")]) == 2
+    error = capsys.readouterr().err
+    assert error.count("\n") == 1
+    assert says in error
+    assert "--task and --target" in error
+    assert not (tmp_path / "x.gif").exists()
+    assert clip_of(own, task="reach", target=2).target == 2, "who gives both needs no evaluation"
+
+
+def test_whole_numbers_with_a_point_are_targets(folder, tmp_path):
+    shutil.copytree(folder, tmp_path / "own")
+    (tmp_path / "own" / "evaluation.csv").write_text("task,target\nreach,49.0\nreach,\n")
+    assert clip_of(tmp_path / "own").target == 49
 
 
 def test_folder_without_policy(tmp_path, capsys):

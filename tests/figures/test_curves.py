@@ -6,10 +6,14 @@ import pytest
 
 from mtcsirl.figures.curves import (
     Series,
+    add_legend,
+    budgets,
     counts,
+    curve_panel,
     curve_title,
     draw_curves,
     missing_note,
+    own_shares,
     success_note,
     summarise_curve,
     tasks_note,
@@ -54,6 +58,45 @@ def test_curves_end_with_the_shortest_run():
     assert curve["mean"].tolist() == [2.0, 2.0]
 
 
+def test_tasks_of_other_budgets_are_drawn_by_their_own_shares():
+    """A slow learner of 100 steps that begins late counts to its end beside one of 50."""
+    slow, quick = [0.0] * 50 + [1.0] * 50, [1.0] * 50
+    uneven = series({("a", 0): slow, ("b", 0): quick}, [], steps=range(1, 101))
+    assert budgets([uneven, series({}, [])]) == (50, 100)
+    shares = summarise_curve(own_shares(uneven).rows)
+    assert shares["step"].iloc[-1] == pytest.approx(100, abs=2)
+    assert shares["mean"].iloc[-1] == 1.0, "both at their end"
+    assert summarise_curve(uneven.rows)["mean"].max() == 0.5, "by steps the slow one is cut off half trained"
+    axes = new_figure(2, 2).subplots()
+    curve_panel(axes, 0, "velocity", [uneven], [])
+    assert axes.get_xlabel() == "% of an agent's 0.05k to 0.1k steps"
+
+
+def test_one_budget_for_all_tasks_of_a_method_keeps_steps():
+    axes = new_figure(2, 2).subplots()
+    short, long = series({("a", 0): [1.0, 1.0]}, []), series({("a", 0): [1.0] * 3}, [], steps=(500, 1000, 1500))
+    curve_panel(axes, 0, "velocity", [short, long], [])
+    assert axes.get_xlabel() == "environment steps"
+    assert max(axes.lines[1].get_xdata()) == 1500
+
+
+def test_few_rows_of_unlike_steps_leave_every_bin_a_mean_over_all_runs():
+    both = pd.concat([rows({("a", 0): [1.0, 1.0]}, (50, 100)), rows({("a", 1): [3.0] * 3}, (33, 67, 100))])
+    assert summarise_curve(both)[["mean", "n"]].to_numpy().tolist() == [[2.0, 2.0], [2.0, 2.0]]
+
+
+@pytest.mark.parametrize(("seeds", "band"), [(2, ["95 % t-interval"]), (1, [])])
+def test_the_legend_names_target_tasks_and_what_a_band_is(seeds, band):
+    figure = new_figure(3, 2)
+    axes = figure.subplots()
+    shown = series({("a", seed): [0.1, 0.1 + seed] for seed in range(seeds)}, [])
+    draw_curves(axes, [shown], "velocity", 0.8)
+    add_legend(figure, [axes], "drawer-close")
+    legend = figure.legends[0]
+    assert [text.get_text() for text in legend.get_texts()] == ["SAC", "target", *band]
+    assert legend.get_title().get_text() == "drawer-close"
+
+
 def test_one_seed_has_no_interval():
     assert summarise_curve(rows({("a", 0): [1.0, 2.0]}))[["low", "high"]].isna().all(axis=None)
 
@@ -68,7 +111,7 @@ def test_success_is_that_of_the_last_tenth_of_each_agents_steps():
     """One agent succeeds at last; another, whose run is longer, no more; two seeds of a task count as one task."""
     late = [0.0] * 9 + [1.0]
     some = series({("a", 0): late, ("a", 1): late, ("b", 0): [1.0] * 18 + [0.5] * 2}, [], steps=range(1, 21))
-    assert success_note([some, series({}, [("a", 0)])]) == ["success at the end of training: SAC 75 %"]
+    assert success_note([some, series({}, [("a", 0)])]) == ["success in the last tenth of training: SAC 75 %"]
     assert success_note([series({}, [("a", 0)])]) == []
 
 

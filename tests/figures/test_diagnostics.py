@@ -1,12 +1,15 @@
 """The figure of an IRL run from made-up rows with the names that real runs write."""
 
 import math
+from pathlib import Path
 
 import pandas as pd
 import pytest
 
+from mtcsirl import cli
 from mtcsirl.figures.diagnostics import CHANCE, caption, draw
 from mtcsirl.figures.style import figure_bytes
+from mtcsirl.files import storage
 from mtcsirl.names import DIAGNOSTIC_COLUMNS
 from mtcsirl.results.notes import SMOKE_NOTE
 
@@ -78,3 +81,58 @@ def test_what_a_method_does_not_log_is_said() -> None:
 def test_chance_is_half_right_and_two_log_two() -> None:
     assert CHANCE["accuracy"] == 0.5
     assert math.isclose(CHANCE["loss"], 2 * math.log(2), abs_tol=1e-4)
+
+
+@pytest.fixture
+def run(tmp_path: Path) -> Path:
+    """The folder of an IRL run that can be drawn."""
+    curve, diagnostics = _frames(("f",))
+    storage.write_csv(tmp_path / "run" / "curve.csv", curve)
+    storage.write_csv(tmp_path / "run" / "diagnostics.csv", diagnostics)
+    storage.write_json(tmp_path / "run" / "reward.json", ABOUT)
+    return tmp_path / "run"
+
+
+def _draw(run: Path) -> int:
+    return cli.main(["draw-diagnostics", "--run", str(run), "--output", str(run.parent / "drawn.png")])
+
+
+def test_the_verb_draws_what_a_run_left(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert _draw(run) == 0
+    assert capsys.readouterr().out.startswith("MT-CSIRL, velocity, seed 7. ")
+    assert (run.parent / "drawn.png").is_file()
+
+
+ABOUT = {"method": "mt_csirl", "cs_reward": "velocity", "about": {"seed": 7}}
+LACKS = "lacks method, cs_reward or about.seed; name the folder of an IRL run"
+FOREIGN = {
+    "a list": ([], LACKS),
+    "a text": ("reward", LACKS),
+    "nothing about it": ({"method": "mt_csirl", "cs_reward": "velocity"}, LACKS),
+    "null about it": (ABOUT | {"about": None}, LACKS),
+    "no seed": (ABOUT | {"about": {}}, LACKS),
+    "a text as seed": (ABOUT | {"about": {"seed": "x"}}, LACKS),
+    "no method": ({"cs_reward": "velocity", "about": {"seed": 7}}, LACKS),
+    "an unknown cs-reward": (ABOUT | {"cs_reward": "banana"}, "cs_reward 'banana' is none of velocity, action_norm"),
+    "null as cs-reward": (ABOUT | {"cs_reward": None}, "cs_reward 'None' is none of"),
+}
+
+
+@pytest.mark.parametrize("what", FOREIGN)
+def test_a_reward_that_says_nothing_of_its_run_is_one_line(
+    run: Path, capsys: pytest.CaptureFixture[str], what: str
+) -> None:
+    content, says = FOREIGN[what]
+    storage.write_json(run / "reward.json", content)
+    assert _draw(run) == 2
+    error = capsys.readouterr().err
+    assert error.count("\n") == 1
+    assert f"{run / 'reward.json'}: {says}" in error
+    assert not list(run.parent.glob("drawn.*"))
+
+
+@pytest.mark.parametrize("name", ["curve.csv", "diagnostics.csv"])
+def test_a_run_that_logged_nothing_is_one_line(run: Path, capsys: pytest.CaptureFixture[str], name: str) -> None:
+    storage.write_csv(run / name, storage.read_csv(run / name).iloc[:0])
+    assert _draw(run) == 2
+    assert f"{run / name}: holds no row" in capsys.readouterr().err

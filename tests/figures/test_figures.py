@@ -37,7 +37,8 @@ def test_draws_all_panels_of_complete_results(name, data):
 def test_target_and_methods_of_the_paper(name, data):
     figure = figure_spec(name).draw(data)
     methods = ["Expert", "MT-CSIRL", "SAC"] if name == "figure_3" else ["IRL agent", "Transferred", "SAC"]
-    assert [text.get_text() for text in figure.legends[0].get_texts()] == methods
+    shown = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert shown == [*methods, "target", "95 % t-interval"]
     order = ["action_norm", "velocity"] if name in ("figure_2", "figure_3") else ["velocity", "action_norm"]
     for axes, metric in zip(figure.axes, order, strict=False):
         assert metric.replace("_", " ") in axes.get_ylabel()
@@ -81,7 +82,7 @@ def test_missing_runs_are_named_and_the_rest_is_drawn(data):
         FigureData(settings=data.settings, curves=data.curves[~gone], scores=data.scores, points=data.points)
     )
     assert "(a) not there yet – Transferred: reach-wall seed 2" in texts(figure)
-    assert "(a) success at the end of training: IRL agent" in texts(figure)
+    assert "(a) success in the last tenth of training: IRL agent" in texts(figure)
     assert any(line.get_label() == "Transferred" for line in figure.axes[0].lines)
 
 

@@ -10,13 +10,17 @@ from mtcsirl.claims.claims import claims_json, judge
 from mtcsirl.errors import UserError
 from mtcsirl.figures.style import figure_bytes, new_figure
 from mtcsirl.files import storage
-from mtcsirl.report.collect import claims_of, collect
+from mtcsirl.files.identity import FILE, Record, checksums, dumps, result_files
+from mtcsirl.report.collect import collect
 from mtcsirl.report.measured import measured
 from mtcsirl.report.page import build_report
+from mtcsirl.report.verdicts import claims_of
 from mtcsirl.results.notes import Note
 from mtcsirl.results.rows import ROW_COLUMNS, SCORE_COLUMNS
 from mtcsirl.settings import Settings
-from mtcsirl.study.design import ARTEFACTS, design
+from mtcsirl.study.artefacts import record_folder, sign_artefact
+from mtcsirl.study.design import ARTEFACTS, CLAIMS, design
+from mtcsirl.study.keys import identity_of
 from mtcsirl.study.outputs import OUTPUTS
 from mtcsirl.tables.grid import Column, Grid, Line
 from mtcsirl.tables.table import Table
@@ -48,14 +52,15 @@ def results(tmp_path_factory):
         results=str(root / "results"), figures=str(root / "figures"), seeds=(0,), irl_seeds=(0,), methods=("mt_csirl",)
     )
     for run in design(settings):
-        storage.write_json(root / "results" / run.folder / "provenance.json", PROVENANCE)
+        folder = root / "results" / run.folder
+        storage.write_json(folder / "provenance.json", PROVENANCE)
         if "gate.json" in OUTPUTS[run.stage]:
             passed = getattr(run, "task", "") != "push-back"
             gate = {"passed": passed, "success": float(passed), "metric": 0.8}
             members = [gate | {"task": task, "target": target} for task, target in getattr(run, "members", ())]
-            storage.write_json(
-                root / "results" / run.folder / "gate.json", gate | ({"members": members} if members else {})
-            )
+            storage.write_json(folder / "gate.json", gate | ({"members": members} if members else {}))
+        record = Record(identity_of(run, settings), checksums(folder, result_files(folder)), {})
+        storage.write_text(folder / FILE, dumps(record))
     png = figure_bytes(new_figure(1, 1), "png", "what it shows, n = 1 seed")
     storage.write_bytes(root / "results" / "tables" / "table_1.png", png)
     for name in ARTEFACTS:
@@ -69,7 +74,34 @@ def results(tmp_path_factory):
     storage.write_json(
         root / "results" / "claims" / "claims.json", claims_json(judge(NO_ROWS, NO_SCORES, settings), settings)
     )
+    for name in (*ARTEFACTS, CLAIMS):
+        sign(settings, name)
     return settings, root
+
+
+def sign(settings, name):
+    """Sign an artefact whatever its files hold."""
+    homes = {"table": Path(settings.results) / "tables", "claims": Path(settings.results) / "claims"}
+    files = homes.get(name.partition("_")[0], Path(settings.figures)).glob(f"{name}.*")
+    sign_artefact(name, settings, sorted(files))
+
+
+class Replaced:
+    """A file with another content; the artefact is signed anew with ``signed``, and all is as before in the end."""
+
+    def __init__(self, settings, name, path, content, signed=False):
+        self.settings, self.path, self.content, self.signed = settings, path, content, signed
+        self.name, self.record = name, record_folder(name, settings.results) / FILE
+
+    def __enter__(self):
+        self.kept = {path: path.read_bytes() for path in (self.path, self.record)}
+        self.path.write_bytes(self.content)
+        if self.signed:
+            sign(self.settings, self.name)
+
+    def __exit__(self, *error):
+        for path, content in self.kept.items():
+            path.write_bytes(content)
 
 
 def test_whole_study(results):
@@ -104,18 +136,21 @@ def test_claims_are_the_judged_ones(results):
     assert all(claim.criterion and claim.reason for claim in claims)
 
 
+@pytest.mark.parametrize("signed", [False, True])
 @pytest.mark.parametrize("text", ["[]", '{"claims": [{"name": "C1"}]}', '{"claims": 3}', "not json"])
-def test_foreign_claims_are_named(results, text):
+def test_foreign_claims_are_named_and_left_out_of_a_page_of_a_part(results, text, signed):
     settings, root = results
     path = root / "results" / "claims" / "claims.json"
-    kept = storage.read_bytes(path)
-    try:
-        storage.write_text(path, text)
+    with Replaced(settings, CLAIMS, path, text.encode(), signed):
         with pytest.raises(UserError, match=r"claims\.json") as caught:
             collect(settings, root / "page.html")
         assert "\n" not in str(caught.value)
-    finally:
-        storage.write_bytes(path, kept)
+        data = collect(settings, root / "page.html", partial=True)
+        assert data.claims == ()
+        (caution,) = data.cautions
+        assert caution.startswith("Left out: Claims (")
+        assert caution.endswith("Make it again with these settings, as by `mtcsirl claims --partial`.")
+        assert len(data.tables) == 5, "the others stay"
 
 
 def test_units_keep_their_state_outcome_power_and_remarks():
@@ -174,7 +209,7 @@ def test_links_lead_to_files(results):
     storage.write_text(page, build_report(collect(settings, page)))
     links = [link for link in re.findall(r'href="([^"]+)"', page.read_text()) if not link.startswith(("#", "data:"))]
     rows = [link for link in links if link.endswith("/gate.json")]
-    assert len(links) - len(rows) == 4 * 5 + 2 * 11 + 1
+    assert len(links) - len(rows) == 4 * 5 + 3 * 11 + 1
     assert rows, "of demonstrations, whose gate is all that this study has"
     for link in links:
         assert (page.parent / link).is_file(), link
@@ -215,17 +250,67 @@ def test_tables_are_read_as_data(results):
     assert collect(settings, root / "page.html").tables[0].table.as_json() == TABLE.as_json()
 
 
+@pytest.mark.parametrize("signed", [False, True])
 @pytest.mark.parametrize("text", ["", "{}", "[]", '{"name": "table_1"}', "not json"])
-def test_a_foreign_table_is_named(results, text):
+def test_a_foreign_table_is_named_and_left_out_of_a_page_of_a_part(results, text, signed):
     settings, root = results
     path = root / "results" / "tables" / "table_1.json"
-    try:
-        storage.write_text(path, text)
+    with Replaced(settings, "table_1", path, text.encode(), signed):
         with pytest.raises(UserError, match=r"table_1\.json") as caught:
             collect(settings, root / "page.html")
         assert "\n" not in str(caught.value)
+        data = collect(settings, root / "page.html", partial=True)
+        assert [table.name for table in data.tables] == ["table_2", "table_3", "table_4", "table_5"]
+        assert data.cautions[0].startswith("Left out: Table 1 (")
+
+
+@pytest.mark.parametrize("signed", [False, True])
+@pytest.mark.parametrize("content", [b"", b"no picture", b"\x89PNG\r\n\x1a\n"])
+def test_a_damaged_picture_is_named_and_left_out_of_a_page_of_a_part(results, content, signed):
+    settings, root = results
+    for name, path in (("figure_s1", root / "figures/figure_s1.png"), ("table_1", root / "results/tables/table_1.png")):
+        with Replaced(settings, name, path, content, signed):
+            with pytest.raises(UserError, match=path.stem) as caught:
+                collect(settings, root / "page.html")
+            assert "\n" not in str(caught.value)
+            data = collect(settings, root / "page.html", partial=True)
+            assert name not in [view.name for view in (*data.tables, *data.figures)]
+            assert len(data.cautions) == 1
+            assert data.cautions[0] in build_report(data).replace("&#39;", "'")
+
+
+def test_a_picture_that_no_record_answers_for_is_not_shown(results):
+    """Left by an older study beside a table that has none today."""
+    settings, root = results
+    stray = root / "results" / "tables" / "table_2.png"
+    stray.write_bytes((root / "results" / "tables" / "table_1.png").read_bytes())
+    try:
+        shown = {view.name for view in collect(settings, root / "page.html").tables if view.picture}
+        assert shown == {"table_1"}
     finally:
-        storage.write_json(path, TABLE.as_json())
+        stray.unlink()
+
+
+def test_an_edited_number_of_a_signed_table_is_seen(results):
+    settings, root = results
+    path = root / "results" / "tables" / "table_5.json"
+    edited = path.read_bytes().replace(b"0.91", b"0.19")
+    says = r"table_5\.json changed since it was written"
+    with Replaced(settings, "table_5", path, edited), pytest.raises(UserError, match=says):
+        collect(settings, root / "page.html")
+
+
+def test_a_table_signed_in_another_folder_is_not_taken_from_this_one(results):
+    settings, root = results
+    record = record_folder("table_5", settings.results) / FILE
+    elsewhere = root / "elsewhere" / "table_5.json"
+    path = root / "results" / "tables" / "table_5.json"
+    storage.write_bytes(elsewhere, path.read_bytes())
+    with Replaced(settings, "table_5", path, path.read_bytes()):
+        sign_artefact("table_5", settings, [elsewhere])
+        assert record.is_file()
+        with pytest.raises(UserError, match=r"table_5\.json: signed in another folder"):
+            collect(settings, root / "page.html")
 
 
 def unit(cs_reward, value, low, high, *, name="part closed", answer="met", unbounded=False):

@@ -183,7 +183,7 @@ def test_verbs_work_on_partial_and_refuse_missing_results(tmp_path, capsys):
         irl_seeds=(0,),
         single_target={"tasks": ("reach-wall",)},
         multi_target={"tasks": ("reach-wall",), "train_targets": (1,)},
-        multi_task={"train_tasks": ("reach",), "train_targets": (1,), "unseen_tasks": ("push-back",)},
+        multi_task={"train_tasks": ("reach", "door-close"), "train_targets": (1,), "unseen_tasks": ("push-back",)},
     )
     write_json(tmp_path / "settings.json", small.model_dump(mode="json"))
     settings = ["--settings", read_text(tmp_path / "settings.json")]

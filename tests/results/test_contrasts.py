@@ -154,3 +154,17 @@ def test_extreme_is_beyond_the_quantile_of_f():
     assert spread_ratio(one, far).extreme
     assert not spread_ratio(far, Summary(0.0, np.nan, 1)).extreme, "one seed has no spread"
     assert not spread_ratio(Summary(0.0, 0.0, 5), Summary(0.0, 0.0, 5)).extreme
+
+
+@pytest.mark.parametrize("left", [0.0, 1.2e-16])
+def test_fieller_of_equal_values_is_their_ratio(left):
+    """Five equal values have a standard deviation of 0 or of what floating point leaves."""
+    for first, second in np.random.default_rng(0).uniform(0.1, 3, size=(200, 2)):
+        found = fieller(Summary(first, left, 5), Summary(second, 1.2e-16, 5))
+        assert found[:3] == pytest.approx((first / second,) * 3, rel=1e-9)
+
+
+@pytest.mark.parametrize("wild", [Summary(1.0, np.inf, 5), Summary(1e300, 1e299, 5), Summary(np.nan, np.nan, 5)])
+def test_fieller_of_what_is_no_number_has_no_ends(wild):
+    for found in (fieller(wild, Summary(1.0, 0.1, 5)), fieller(Summary(1.0, 0.1, 5), wild)):
+        assert np.isnan([found.low, found.high]).all()

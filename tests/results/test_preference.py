@@ -161,6 +161,47 @@ def test_agents_without_an_expert_are_rows_and_no_verdict(tmp_path: Path) -> Non
     assert "No new agent has an expert" in preferences_markdown(alone)
 
 
+def made_up(behaviour: str, seeds: range, r_task: tuple[float, ...], f: float) -> list[dict[str, object]]:
+    """Rows of one behaviour; ``r_task`` of its seeds in turn."""
+    key = {"experiment": "multi_task", "method": "m", "cs_reward": "c", "source": "all", "task": "reach", "target": 0}
+    return [
+        key
+        | {"seed": seed, "behaviour": behaviour, "r_task": own, "f": f, "paid": own + f, "paid_from_start": own + f}
+        | {"success": 1.0, "episodes": 4}
+        for seed, own in zip(seeds, r_task, strict=True)
+    ]
+
+
+def test_means_are_over_pairs_so_that_one_lost_expert_costs_one_pair() -> None:
+    """Over all five new agents these would have more r_task than their experts, and nothing would be even."""
+    new = made_up(NEW, range(5), (1.0, 1.0, 9.0, 9.0, 9.0), 4.0)
+    experts = made_up(EXPERT, range(2), (5.0, 5.0), 2.0)
+    (found,) = preferences(pd.DataFrame(new + experts)).to_dict("records")
+    (pairs,) = preferences(pd.DataFrame(new[:2] + experts)).to_dict("records")
+    assert found == pairs
+    assert (found["n"], found[f"r_task {NEW}"], found[f"r_task {EXPERT}"]) == (2, 1.0, 5.0)
+    assert found["even_at"] == pytest.approx(2.0)
+    assert found["beyond"] == found[f"paid {NEW}"] - found[f"paid {EXPERT}"]
+
+
+def test_plain_sac_counts_beside_pairs_and_says_its_own_number() -> None:
+    pairs = made_up(NEW, range(3), (1.0, 2.0, 3.0), 4.0) + made_up(EXPERT, range(1, 4), (5.0, 5.0, 5.0), 2.0)
+    rows = pd.DataFrame(pairs + made_up(SAC, range(2), (100.0, 7.0), 1.0))
+    (found,) = preferences(rows).to_dict("records")
+    assert (found["n"], found[f"n {SAC}"], found[f"r_task {SAC}"]) == (2, 1, 7.0)
+    assert "| 7.0, 1.0 (n = 1) |" in preferences_markdown(rows)
+    (whole,) = preferences(pd.DataFrame(pairs + made_up(SAC, range(4), (0.0,) * 4, 1.0))).to_dict("records")
+    assert whole[f"n {SAC}"] == whole["n"] == 2
+    assert "(n = " not in preferences_markdown(pd.DataFrame(pairs + made_up(SAC, range(4), (0.0,) * 4, 1.0)))
+
+
+def test_a_pair_without_a_number_is_none() -> None:
+    new, experts = made_up(NEW, range(2), (1.0, 2.0), 4.0), made_up(EXPERT, range(2), (5.0, np.nan), 2.0)
+    (found,) = preferences(pd.DataFrame(new + experts)).to_dict("records")
+    assert (found["n"], found[f"r_task {NEW}"]) == (1, 1.0)
+    assert preferences(pd.DataFrame(new[:1] + experts[1:])).empty
+
+
 def test_a_reward_of_another_cs_reward_is_refused(tmp_path: Path) -> None:
     study, at = write(tmp_path)
     run = of(study)[0]

@@ -240,6 +240,47 @@ def test_without_its_gate_a_run_is_incomplete(results):
         evaluation_rows(STUDY, at(results))
 
 
+FINE = {"passed": True, "success": 1.0, "metric": 0.75}
+NO_GATES = {
+    "a list": [],
+    "passed as text": FINE | {"passed": "false"},
+    "passed as number": FINE | {"passed": 1},
+    "passed as null": FINE | {"passed": None},
+    "success as text": FINE | {"success": "all"},
+    "no metric": {"passed": True, "success": 1.0},
+    "diverged as text": FINE | {"diverged": "none"},
+    "members as text": FINE | {"members": "ab"},
+    "members as null": FINE | {"members": None},
+    "a member that is a text": FINE | {"members": ["a"]},
+    "a member whose passed is a text": FINE | {"members": [FINE | {"task": "reach", "target": 1, "passed": "false"}]},
+}
+
+
+@pytest.mark.parametrize("run", [STUDY.experts[0], STUDY.demonstrations[0]], ids=lambda run: run.stage)
+@pytest.mark.parametrize("what", NO_GATES)
+def test_what_is_no_verdict_of_a_gate_is_one_line(results, what, run):
+    storage.write_json(results / run.folder / "gate.json", NO_GATES[what])
+    sign(run, at(results))
+    with pytest.raises(UserError, match=r"gate\.json: not the verdict of a gate; delete it") as error:
+        evaluation_rows(STUDY, at(results), partial=True)
+    assert "\n" not in str(error.value)
+
+
+def test_a_member_of_a_gate_is_found_by_task_and_target(results):
+    """The run's own word counts for an agent that no member speaks of."""
+    run = STUDY.experts[0]
+    own = {"task": run.task, "target": run.target}
+    for members, status in (
+        ([FINE | own | {"passed": False}], "below gate"),
+        ([FINE | own, FINE | own | {"target": [1], "passed": False}], "ok"),
+        ([FINE | {"task": "other", "passed": False}], "ok"),
+    ):
+        storage.write_json(results / run.folder / "gate.json", FINE | {"members": members})
+        sign(run, at(results))
+        rows = select(evaluation_rows(STUDY, at(results)), stage="train_expert", task=run.task, seed=run.seed)
+        assert set(rows["status"]) == {status}, members
+
+
 @pytest.mark.parametrize(("column", "text"), [("value", "abc"), ("episode", "first"), ("seed", "zero")])
 def test_text_in_a_column_of_numbers_is_one_line(results, column, text):
     run = STUDY.baselines[0]

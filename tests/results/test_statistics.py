@@ -240,3 +240,13 @@ def test_cluster_bootstrap_draws_seeds_before_episodes():
     estimate = cluster_bootstrap(mean, [seed, episode], np.random.default_rng(0), resamples=100)
     assert set(draws) == {0.0, 0.5, 1.0}
     assert estimate.n == 6
+
+
+@pytest.mark.parametrize("wild", [Summary(1.0, np.inf, 5), Summary(1e300, 1e299, 5), Summary(np.nan, np.nan, 5)])
+def test_what_is_no_number_has_no_effect_and_no_test(wild):
+    assert np.isnan(hedges_g(wild, Summary(1.0, 0.1, 5)).value)
+    assert np.isnan(welch(wild, Summary(1.0, 0.1, 5)).low)
+
+
+def test_equal_values_have_no_spread_but_that_of_floating_point():
+    assert hedges_g(summarise([0.948] * 5), summarise([0.875] * 5)).value == np.inf

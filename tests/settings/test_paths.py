@@ -1,11 +1,14 @@
 """Folders of a study: what cannot be one, or must not, is said when the configuration is read."""
 
+import subprocess
 from pathlib import Path
 
 import pytest
 
 from mtcsirl import cli
-from mtcsirl.settings import Settings
+from mtcsirl.errors import UserError
+from mtcsirl.results import parts
+from mtcsirl.settings import Settings, paths
 from mtcsirl.settings.loading import load
 
 WRONG = {
@@ -18,6 +21,12 @@ WRONG = {
     "its source": ("src", "a folder of this suite's own source"),
     "deep in it": ("workflow/rules/../report", "a folder of this suite's own source"),
     "its history": (".git/results", "a folder of this suite's own source"),
+    "its environment": (".venv", "a folder of this suite's own source"),
+    "its pages": ("docs/x", "a folder of this suite's own source"),
+    "where make builds": ("build", "make builds there and may empty it; name another, for example build/check"),
+    "what make built": ("build/site/results", "make builds there and may empty it"),
+    "its archive": ("results/reference", "it holds an archive of runs; name a folder beside it"),
+    "a part of it": ("results/reference/part-0002", "results/reference holds an archive of runs; name a folder beside"),
 }
 
 
@@ -35,10 +44,37 @@ def test_no_study_is_written_there(
     assert says in error
 
 
-@pytest.mark.parametrize("place", ["results", "results/paper", "build/check", "paper_figs", "elsewhere/deep", "docs/x"])
+@pytest.mark.parametrize(
+    "place",
+    ["results", "results/paper", "build/check", "paper_figs", "elsewhere/deep", "build/reference/results/reference"],
+)
 def test_other_folders_of_the_checkout_are_free(place: str, checkout: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(checkout)
     assert load(overrides=[f"results={place}"]).results == place
+
+
+def test_every_folder_that_git_tracks_is_a_source(checkout: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(checkout)
+    listed = subprocess.run(["git", "ls-files"], capture_output=True, text=True, check=True).stdout.splitlines()
+    folders = {name.partition("/")[0] for name in listed if "/" in name} - {"results", "paper_figs"}
+    assert "docs" in folders
+    for folder in folders:
+        with pytest.raises(UserError, match="a folder of this suite's own source"):
+            load(overrides=[f"results={folder}"])
+
+
+def test_an_archive_is_one_wherever_it_lies_and_nothing_else_is(tmp_path: Path) -> None:
+    first, manifest = paths._PART
+    assert parts.PART.fullmatch(first)
+    assert manifest == parts.MANIFEST
+    (tmp_path / first / "study").mkdir(parents=True)
+    for free in (tmp_path, tmp_path / first / "study"):  # partitions of a disk may have that name
+        assert load(overrides=[f"results={free}"]).results == str(free)
+    (tmp_path / first / manifest).write_text("{}")
+    for taken in (tmp_path, tmp_path / first, tmp_path / "new", tmp_path / first / "study"):
+        with pytest.raises(UserError, match="holds an archive of runs; name a folder beside it"):
+            load(overrides=[f"results={taken}"])
+    assert load(overrides=[f"results={tmp_path}-new"]), "a folder beside it"
 
 
 def test_a_folder_outside_may_have_the_name_of_a_source_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

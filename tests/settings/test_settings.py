@@ -116,6 +116,12 @@ BAD: list[tuple[dict[str, Any], str]] = [
     ({"single_target": {"tasks": []}}, "single_target.tasks = []: must not be empty"),
     ({"multi_target": {"train_targets": [50]}}, "multi_target.train_targets.0 = 50: must be less than 50"),
     ({"multi_task": {"unseen_tasks": ["reach"]}}, "multi_task: unseen_tasks also in train_tasks: reach"),
+    (
+        {"multi_task": {"train_tasks": ["reach"]}},
+        "multi_task: train_tasks holds reach alone, as single_target can; name two or more",
+    ),
+    ({"sac": {"updates_per_step": 1e300}}, "sac.updates_per_step = 1e+300: must be less than or equal to 1000"),
+    ({"sac": {"updates_per_step": float("inf")}}, "sac.updates_per_step = inf: must be a finite number"),
     ({"seeds": [0, 0]}, "seeds = [0, 0]: lists an entry twice"),
     ({"seeds": []}, "seeds = []: must not be empty"),
     ({"methods": ["gail"]}, "unknown method 'gail'; allowed: mt_airl, "),
@@ -212,6 +218,26 @@ def test_overrides() -> None:
     for wrong in ("sac.minibatch", "=3", "sac.minibatch=[1"):
         with pytest.raises(UserError, match="--set"):
             override({}, [wrong])
+
+
+@pytest.mark.parametrize(
+    ("assignments", "key"),
+    [
+        (["seeds=[0]", "seeds=[1]"], "seeds"),
+        (["sac.minibatch=3", "seeds=[0]", "sac.minibatch=3"], "sac.minibatch"),
+        (["sac={minibatch: 3}", "sac.minibatch=4"], "sac.minibatch"),
+        (["sac=3", "sac.minibatch=4"], "sac.minibatch"),
+    ],
+    ids=str,
+)
+def test_no_key_is_set_twice(assignments: list[str], key: str) -> None:
+    with pytest.raises(UserError, match=f"^--set {key}: given twice; keep one$"):
+        override({}, assignments)
+
+
+def test_keys_of_one_mapping_are_set_one_by_one() -> None:
+    steps = ["expert.steps={default: 5}", "expert.steps.reach=6", "expert.steps.reach-wall=7"]
+    assert override({}, steps) == {"expert": {"steps": {"default": 5, "reach": 6, "reach-wall": 7}}}
 
 
 def test_settings_are_frozen() -> None:

@@ -20,6 +20,12 @@ WRONG = [
     ("sac: {minibatch: 3, minibatch: 4}", "the key 'minibatch' stands twice in one mapping (line 1)"),
     ('{"seeds": [0], "seeds": [1]}', "the key 'seeds' stands twice in one mapping"),
     ('{"sac": {"minibatch": 3, "minibatch": 4}}', "the key 'minibatch' stands twice"),
+    ("sac: {<<: {discount: 0.5, discount: 0.6}}", "the key 'discount' stands twice in one mapping (line 1); keep one"),
+    ("a: {<<: [{b: 1}, {c: 2, c: 3}]}", "the key 'c' stands twice in one mapping (line 1)"),
+    (
+        "sac:\n  <<: {discount: 0.5}\n  <<: {discount: 0.6}",
+        "the key '<<' stands twice in one mapping (line 3); merge a list, <<: [*one, *two]",
+    ),
     ("seeds: [0100]", "0100 (line 1) is a number in base 8"),
     ("seeds: [-010]", "-010 (line 1) is a number in base 8"),
     ("seeds: [64:30]", "64:30 (line 1) is a number in base 60"),
@@ -73,6 +79,8 @@ def test_what_yaml_and_reader_agree_on_is_read(checkout: Path) -> None:
         assert parse(text) == yaml.safe_load(text.removeprefix("\ufeff")), text
     shared = "one: &one {default: 3}\ntwo: *one\nthree: {<<: *one, reach: 4}\n"
     assert parse(shared) == yaml.safe_load(shared), "aliases and merges stay allowed"
+    merged = f"{shared}four: &four {{<<: [*one, {{default: 9, push: 5}}], default: 7}}\nfive: {{<<: *four, push: 6}}\n"
+    assert parse(merged) == yaml.safe_load(merged), "a key may stand in what is merged and beside it"
 
 
 def _snakemake(checkout: Path, folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:

@@ -13,7 +13,7 @@ from mtcsirl.study.outputs import OUTPUTS
 from tests.faults.command import CHANGES
 
 KEY = {"task": "reach", "target": 0, "seed": 0}
-SMALL = [word for key, value in CHANGES.items() for word in ("--set", f"{key}={value}")]
+SMALL = [word for key, value in CHANGES.items() if key != "steps" for word in ("--set", f"{key}={value}")]
 
 
 def _contents(folder: Path) -> dict[str, str]:

@@ -52,6 +52,37 @@ def test_what_is_stale_or_absent_says_nothing(settings: Settings) -> None:
     assert [line.runs for line in spent(study, settings, RATES)] == [1]
 
 
+@pytest.mark.parametrize(
+    ("provenance", "says"),
+    [
+        ({"commit": "x"}, "lacks lockstep"),
+        ({"lockstep": 3, "cost": {"cpu_seconds": 1.0}, "machine": {"processor": "x"}}, "lockstep is '3', not a list"),
+        (
+            {"lockstep": [], "cost": {"cpu_seconds": "1"}, "machine": {"processor": "x"}},
+            "cpu_seconds is '1', not a numb",
+        ),
+        ({"lockstep": [], "cost": {"cpu_seconds": 1.0}, "machine": []}, "lacks machine.processor"),
+        ([], "lacks lockstep"),
+    ],
+)
+def test_a_damaged_provenance_is_named(
+    provenance: object, says: str, settings: Settings, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    first, second = design(settings).baselines[:2]
+    took(first, settings, 0.5, [])
+    took(second, settings, 0.5, [])
+    path = Path(settings.results) / second.folder / "provenance.json"
+    storage.write_json(path, provenance)
+    file = tmp_path / "settings.json"
+    file.write_text(settings.model_dump_json(), encoding="utf-8")
+    assert cli.main(["plan", "--against-runs", "--settings", str(file)]) == 2
+    error = capsys.readouterr().err
+    assert error.startswith(f"mtcsirl: {path}: ")
+    assert says in error
+    assert error.endswith("; delete its folder and make it again\n")
+    assert error.count("\n") == 1
+
+
 def test_the_verb_prints_it_and_refuses_a_study_without_runs(
     settings: Settings, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -10,7 +10,8 @@ from mtcsirl.files.identity import CHECKPOINT, marker, write_marker
 from mtcsirl.irl import run
 from mtcsirl.settings import Settings
 from mtcsirl.stages import running
-from mtcsirl.study.artefacts import record_folder, settle_artefacts, sign_artefact
+from mtcsirl.study import artefacts
+from mtcsirl.study.artefacts import not_rendered, record_folder, settle_artefacts, sign_artefact
 from mtcsirl.study.design import design
 from mtcsirl.study.standing import settle
 from tests.study.made_up import finish
@@ -62,6 +63,31 @@ def test_whoever_plans_marks_what_is_done_and_nothing_else(found: tuple[Path, Pa
     assert list(settled(True).values()) == wanted
     assert markers(done) == {marker(wanted[0])}
     assert markers(stale) == set()
+
+
+def test_a_page_with_other_bytes_than_were_signed_is_made_again(pages: tuple[Path, Path, Settle]) -> None:
+    """As `mtcsirl verify` sees it: else nothing would ever mend what the report refuses."""
+    done, _, settled = pages
+    settled(True)
+    assert markers(done)
+    (done.parents[1] / DONE).write_text("draws")
+    settled(True)
+    assert markers(done) == set()
+    (done.parents[1] / DONE).write_text("drawn")
+    settled(True)
+    assert markers(done)
+
+
+def test_a_damaged_picture_of_another_machine_is_none(settings: Settings, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where nothing can be rendered, such a picture stays only while it is whole."""
+    picture = Path(settings.results) / "figure_8.png"
+    storage.write_text(picture, "drawn")
+    monkeypatch.setattr(artefacts, "lacking", lambda: None)
+    sign_artefact("figure_8", settings, [picture])
+    monkeypatch.setattr(artefacts, "lacking", lambda: "no OSMesa")
+    assert not_rendered("figure_8", settings) is None
+    picture.write_text("damaged")
+    assert not_rendered("figure_8", settings) == "no OSMesa"
 
 
 def test_a_job_that_reads_the_workflow_touches_no_marker(found: tuple[Path, Path, Settle, list[str]]) -> None:

@@ -7,13 +7,17 @@ import subprocess
 import sys
 import time
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
+from mtcsirl.files import storage
+from mtcsirl.files.identity import FILE, checksums, dumps, read_record, result_files
 from mtcsirl.settings import Settings
 from mtcsirl.study.design import design
-from mtcsirl.study.status import before_it_starts
+from mtcsirl.study.standing import DONE, STALE
+from mtcsirl.study.status import FAILED, before_it_starts, run_status
 from tests.conftest import CHECKOUT, HEEDING
 from tests.study.made_up import finish
 
@@ -31,6 +35,52 @@ def test_a_line_says_what_is_done_stale_and_why(settings: Settings) -> None:
     line = before_it_starts(study, settings)
     assert f"of {len(runs)} runs 1 done, 2 stale, 1 incomplete (2 x steps: 123 -> " in line
     assert "\n" not in line
+
+
+def test_a_stale_run_names_its_first_reasons_and_counts_the_rest(settings: Settings) -> None:
+    first, second = design(settings).baselines[:2]
+    finish(first, settings, steps=123)
+    finish(second, settings, steps=123, **{f"a{number}": "x" * 300 for number in range(9)})
+    few, many = (run_status(run, settings) for run in (first, second))
+    assert (few.state, many.state) == (STALE, STALE)
+    assert few.says.startswith("steps: 123 -> ")
+    assert "more" not in few.says
+    assert many.says.startswith("a0: xxx")
+    assert many.says.endswith("; and 7 more")
+    assert many.says.count("; ") == 3
+    assert len(many.says) < 300
+
+
+@pytest.mark.parametrize(
+    ("name", "said", "says"),
+    [
+        ("provenance.json", {"commit": "x"}, "lacks cost.cpu_seconds; delete its folder and make it again"),
+        ("provenance.json", {"cost": {"cpu_seconds": "1"}}, "cost.cpu_seconds is '1', not a number; delete its folder"),
+        ("gate.json", {}, "gate.json: changed since its run wrote it"),
+    ],
+)
+def test_a_damaged_run_says_which_file_and_what_to_do(settings: Settings, name: str, said: object, says: str) -> None:
+    run = design(settings).baselines[0]
+    finish(run, settings)
+    assert run_status(run, settings).state == DONE
+    path = Path(settings.results) / run.folder / name
+    storage.write_json(path, said)
+    found = run_status(run, settings)
+    assert found.state == FAILED
+    assert found.says.startswith(f"{path}: ")
+    assert says in found.says
+
+
+def test_a_signed_gate_that_is_none_is_named(settings: Settings) -> None:
+    run = design(settings).baselines[0]
+    finish(run, settings)
+    folder = Path(settings.results) / run.folder
+    record = read_record(folder)
+    assert record is not None
+    for said, says in (({}, "lacks passed"), ({"passed": None}, "passed is 'None', not true or false")):
+        storage.write_json(folder / "gate.json", said)
+        storage.write_text(folder / FILE, dumps(replace(record, files=checksums(folder, result_files(folder)))))
+        assert says in run_status(run, settings).says
 
 
 def watch(settings: Settings) -> subprocess.Popen[str]:

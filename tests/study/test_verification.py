@@ -90,3 +90,54 @@ def test_one_run_alone_can_be_verified(results: Path) -> None:
 def test_no_such_folder_is_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["verify", str(tmp_path / "none")]) == 2
     assert capsys.readouterr().err.count("\n") == 1
+
+
+def _elsewhere(results: Path) -> None:
+    """All runs of one stage on another disk, linked back."""
+    (results / "sac").rename(results.parent / "elsewhere")
+    (results / "sac").symlink_to(results.parent / "elsewhere", target_is_directory=True)
+
+
+@pytest.fixture
+def linked(tmp_path: Path, results: Path) -> Path:
+    """The two runs behind a link, which they are to be found through."""
+    inner = tmp_path / "results"
+    inner.mkdir()
+    (results / "sac").rename(inner / "sac")
+    _elsewhere(inner)
+    return inner
+
+
+def test_runs_behind_a_link_are_looked_at(linked: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["verify", str(linked)]) == 0
+    _flip(linked / "sac/reach-t0/s0/curve.csv")
+    assert cli.main(["verify", str(linked)]) == 2
+    assert "curve.csv changed since its run wrote it" in capsys.readouterr().out
+    (found,) = faults(linked)
+    assert found.path == linked / "sac/reach-t0/s0", "under the name that it has here"
+
+
+@pytest.mark.parametrize("what", DAMAGE)
+def test_what_is_wrong_behind_a_link_is_named(linked: Path, what: str) -> None:
+    damage, said = DAMAGE[what]
+    damage(linked / "sac/reach-t0/s0")
+    (found,) = faults(linked)
+    assert said in found.why
+
+
+def test_one_run_that_is_a_link_is_looked_at(results: Path) -> None:
+    folder = results / "sac/reach-t0/s0"
+    folder.rename(results.parent / f"{results.name}-s0")
+    folder.symlink_to(results.parent / f"{results.name}-s0", target_is_directory=True)
+    assert not list(faults(results))
+    _flip(folder / "policies/reach.json")
+    assert [fault.path for fault in faults(results)] == [folder]
+
+
+def test_links_in_a_circle_end(results: Path) -> None:
+    folder = results / "sac/reach-t0"
+    for name, leads in {"itself": folder, "up": results, "gone": results / "nowhere", "twice": folder / "s0"}.items():
+        (folder / name).symlink_to(leads, target_is_directory=True)
+    assert not list(faults(results))
+    _flip(folder / "s0/curve.csv")
+    assert len(list(faults(results))) == 1, "what two names lead to is wrong once"

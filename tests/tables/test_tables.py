@@ -70,6 +70,16 @@ def test_table_1_and_3_have_diagonal_bold_and_the_baseline_last(tables):
         assert "?" not in tables[name].markdown().split("\n\n")[1], "said once, in a remark, not in every cell"
 
 
+@pytest.mark.parametrize("name", ["table_1", "table_3"])
+def test_the_caption_names_the_method_that_learned(rows, tables, name):
+    assert "MT-CSIRL learned the reward; " in tables[name].caption
+    assert tables[name].caption.endswith("and the paper's mean.")
+    chosen = SETTINGS.multi_target.model_copy(update={"method": "mt_airl"})
+    other = TABLES[name](rows[name], SETTINGS.model_copy(update={"multi_target": chosen}))
+    assert "MT-AIRL learned the reward; " in other.caption
+    assert other.caption.endswith("and the paper's mean, that of MT-CSIRL.")
+
+
 def test_table_2_says_who_falls_inside_the_papers_interval(tables):
     numbers = tables["table_2"].csv().set_index(["row", "column"])
     assert numbers.loc[("MT-CSIRL", "velocity: average velocity"), "in_prediction"] == "inside"

@@ -13,17 +13,17 @@ from mtcsirl.claims.evidence import Evidence, Group, RewardSource, behind, multi
 from mtcsirl.claims.failures import equivalent_to_sac, stays_behind
 from mtcsirl.claims.judging import (
     BLOCKED,
+    JUDGED,
     MET,
     NOT_MET,
     NOT_RUN,
     SHOWN,
-    UNCLEAR,
+    Answer,
     Rules,
     Unit,
     against,
     at_least,
     at_most,
-    checked,
     closed,
     closed_in_paper,
     closing,
@@ -31,9 +31,9 @@ from mtcsirl.claims.judging import (
     scaled,
     surely,
     tasks_of,
-    unjudged,
-    works_at_home,
+    worst,
 )
+from mtcsirl.claims.preconditions import checked, failing, unjudged, works_at_home
 from mtcsirl.claims.scored import correlation
 from mtcsirl.results.contrasts import fieller, fieller_of
 from mtcsirl.results.published import NOT_PRINTED, Published, in_paper_order
@@ -191,9 +191,9 @@ def suffers_without(evidence: Evidence, rules: Rules) -> Iterator[Unit]:
     """C12: generators trained without the curriculum succeed less often than those trained with it."""
     cs, needed = evidence.settings.ablations.cs_reward, rules["advantage"]
     for task in evidence.settings.ablations.tasks:
-        source = single_target(cs, task)
-        with_it = evidence.generators(source)
-        without = evidence.generators(replace(source, experiment=rules["experiment"]))
+        source, seeds = single_target(cs, task), evidence.settings.ablations.seeds
+        with_it = evidence.generators(source, seeds=seeds)
+        without = evidence.generators(replace(source, experiment=rules["experiment"]), seeds=seeds)
         terms = (1.0, with_it.sure_success), (-1.0, without.sure_success)
         parts = [surely(f"less success without it by {100 * needed:g} points", *terms, constant=-needed)]
         test = contrast(*terms)
@@ -201,7 +201,12 @@ def suffers_without(evidence: Evidence, rules: Rules) -> Iterator[Unit]:
         unit = judged_unit(
             cs, task, without, parts, "success lost without the curriculum", value, holds=Interval(needed, np.inf)
         )  # fmt: skip
-        yield checked(evidence, against(unit, without, with_it, "with the curriculum"), rules, source, with_it, without)
+        unit = checked(
+            evidence, against(unit, without, with_it, "with the curriculum"), rules, source, with_it, without
+        )
+        # Where they fail with it as well, they have nothing to lose.
+        why = failing(with_it, "generators with it", seeds, evidence.settings.gates.success, rules["gates"])
+        yield unjudged(unit, BLOCKED, why) if why and unit.state in JUDGED else unit
 
 
 def beats_single(evidence: Evidence, rules: Rules) -> Iterator[Unit]:
@@ -224,6 +229,7 @@ def _against_single(evidence: Evidence, rules: Rules, several: RewardSource, sin
     parts = [
         surely(f"closer than {home}'s by {100 * needed:g} % of SAC's gap", (1.0, lead), (-needed, sac.distance)),
         at_least(ours.sure_success, rules["success"], "success"),
+        *_as_the_text_says(ours, theirs, sac, home, rules),
     ]
     value = fieller(lead, sac.distance)
     unit = judged_unit(
@@ -233,9 +239,24 @@ def _against_single(evidence: Evidence, rules: Rules, several: RewardSource, sin
     groups = ours, theirs, own, sac
     unit = checked(evidence, against(unit, ours, theirs, f"{home}'s reward"), rules, single, *groups, pairs=lead.n)
     why, failed = evidence.blocked(several, ["experts"], rules["gates"])
-    if why and unit.state in (MET, NOT_MET, UNCLEAR):
+    if why and unit.state in JUDGED:
         return unjudged(unit, BLOCKED if failed else NOT_RUN, why)
-    return works_at_home(unit, own, sac_own, rules["needs_diagonal"])
+    return works_at_home(unit, own, sac_own, rules)
+
+
+def _as_the_text_says(ours: Group, theirs: Group, sac: Group, home: str, rules: Rules) -> Iterator[Answer]:
+    """The claim's text, where its criterion does not say it: one reward transfers, as in C7, where the other does not.
+
+    Only a sure contradiction counts, so that the criterion decides wherever the text does not rule it out.
+    """
+    part = rules["needs_diagonal"]
+    if closing(ours.distance, sac.distance, part)[0] == NOT_MET:
+        yield NOT_MET, f"transfers itself (closes {100 * part:g} % of SAC's gap)"
+    if (
+        worst([closing(theirs.distance, sac.distance, part), at_least(theirs.sure_success, rules["success"], "")])
+        == MET
+    ):
+        yield NOT_MET, f"{home}'s reward does not transfer"
 
 
 def _lead_in_paper(paper: Published, cs: str, home: str, task: str, method: str, target: float) -> float:

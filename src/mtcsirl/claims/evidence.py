@@ -1,6 +1,6 @@
 """What the claims are judged on: groups of agents, their distances to the target, and their preconditions."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -143,12 +143,19 @@ class Evidence:
         return self._agents.groupby(key).indices, self._last.groupby(key).indices
 
     def group(
-        self, cs_reward: str, tasks: Iterable[str], key: Mapping[str, str], target: int = EVALUATION_TARGET
+        self,
+        cs_reward: str,
+        tasks: Iterable[str],
+        key: Mapping[str, str],
+        target: int = EVALUATION_TARGET,
+        seeds: Collection[int] = (),
     ) -> Group:
         """The agents with this ``key`` (stage and what else is not empty) on ``tasks``, judged by ``cs_reward``.
 
-        A task without any agent makes every seed's mean over tasks unknown, as a missing agent does.
+        ``seeds``: unless the study's, which are IRL's for generators; an ablation may have trained others as well. A
+        task without any agent makes every seed's mean over tasks unknown, as a missing agent does.
         """
+        seeds = seeds or (self.settings.irl_seeds if key["stage"] == "learn_reward" else self.settings.seeds)
         names = [key.get(name, "") for name in ("stage", "experiment", "method", "cs_reward", "source")]
         goal = COMMON_SENSE_REWARDS[cs_reward].target
         nothing = np.array([], dtype=int)
@@ -156,6 +163,7 @@ class Evidence:
         def of(agents: pd.DataFrame, places: Mapping[Any, Any], last: Group | None) -> Group:
             found = {task: places.get((*names, task, target), nothing) for task in tasks}
             frames = {task: agents.iloc[place].set_index("seed") for task, place in found.items()}
+            frames = {task: frame[frame.index.isin(list(seeds))] for task, frame in frames.items()}
             return Group(key["stage"], frames, cs_reward, goal, self.settings.evaluation.episodes, last)
 
         tasks = tuple(tasks)
@@ -174,11 +182,15 @@ class Evidence:
         """New agents on ``tasks`` with the rewards of ``source``."""
         return self.group(source.cs_reward, tasks, {"stage": "transfer", **source.key}, target)
 
-    def generators(self, source: "RewardSource", tasks: Iterable[str] | None = None) -> Group:
-        """The generators of ``source`` on the first of its targets, all its tasks or those given."""
-        return self.group(
-            source.cs_reward, tasks or source.tasks, {"stage": "learn_reward", **source.key}, source.targets[0]
-        )
+    def generators(
+        self, source: "RewardSource", tasks: Iterable[str] | None = None, seeds: Collection[int] = ()
+    ) -> Group:
+        """The generators of ``source`` on the first of its targets, all its tasks or those given.
+
+        ``seeds``: other than the study's IRL seeds.
+        """
+        key = {"stage": "learn_reward", **source.key}
+        return self.group(source.cs_reward, tasks or source.tasks, key, source.targets[0], seeds)
 
     def blocked(self, source: "RewardSource", needs: Iterable[str], share: float) -> tuple[str, bool]:
         """Which of ``needs`` ("experts", "generators") of ``source`` failed their gate too often, or are not known to
@@ -196,7 +208,7 @@ class Evidence:
                 "target": list(source.targets),
                 "seed": list(source.expert_seeds(self.settings)),
             },
-            "generators": {"stage": "learn_reward", **source.key},
+            "generators": {"stage": "learn_reward", **source.key, "seed": list(self.settings.irl_seeds)},
         }
         for name in needs:
             found = select(self._agents, **keys[name])

@@ -24,19 +24,17 @@ from mtcsirl.claims.judging import (
     Unit,
     against,
     at_least,
-    checked,
     closed,
     closed_in_paper,
     closing,
     judged_unit,
-    no_gap,
     staying_below,
     surely,
     tasks_of,
     three_way,
-    works_at_home,
     worst,
 )
+from mtcsirl.claims.preconditions import checked, no_gap, works_at_home
 from mtcsirl.results.contrasts import Nearness, equivalence_power, nearness
 from mtcsirl.results.published import in_paper_order
 from mtcsirl.results.statistics import Interval, Summary
@@ -108,7 +106,7 @@ def stays_behind(evidence: Evidence, rules: Rules) -> Iterator[Unit]:
             unit = checked(evidence, against(unit, group, own, "own task"), rules, source, *groups, pairs=lead.n)
             # Transfer elsewhere contradicts the claim, whatever becomes of the reward's own task.
             against_it = unit.state == NOT_MET and TRANSFERS in outcomes
-            yield unit if against_it else works_at_home(unit, own, sac_own, rules["needs_diagonal"])
+            yield unit if against_it else works_at_home(unit, own, sac_own, rules)
 
 
 def _fate(group: Group, sac: Group, rules: Rules) -> Answer:

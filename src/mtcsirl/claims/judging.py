@@ -2,12 +2,11 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from mtcsirl.claims.evidence import Evidence, Group, RewardSource, closer
+from mtcsirl.claims.evidence import Evidence, Group, closer
 from mtcsirl.results.contrasts import SpreadRatio, fieller, spread_ratio
 from mtcsirl.results.published import NOT_PRINTED
 from mtcsirl.results.statistics import (
@@ -25,6 +24,7 @@ from mtcsirl.results.statistics import (
 )
 
 MET, NOT_MET, UNCLEAR = "met", "not met", "unclear"
+JUDGED = (MET, NOT_MET, UNCLEAR)
 TOO_FEW, BLOCKED, NOT_RUN = "too few seeds", "precondition not met", "not run"
 SHOWN = "not judged"
 """A unit that stands beside the judged ones for comparison."""
@@ -33,7 +33,6 @@ NO_GAP = "no gap to close"
 UNDECIDED = "undecided"
 """What became of new agents where the claim is that nothing does."""
 NO_ESTIMATE = Estimate(np.nan, np.nan, np.nan, 0)
-CONDITIONAL = "conditional on the experts: all IRL seeds imitate those of the first seed"
 Rules = Mapping[str, Any]
 Answer = tuple[str, str]
 """(met, not met or unclear; about what)."""
@@ -139,66 +138,6 @@ def against(unit: Unit, group: Group, reference: Group, name: str) -> Unit:
         closer=closer(group, reference),
         notes=(*unit.notes, *kept),
     )
-
-
-def checked(
-    evidence: Evidence, unit: Unit, rules: Rules, source: RewardSource | None, *groups: Group, pairs: int | None = None
-) -> Unit:
-    """The unit, or why it cannot be judged: no results, failed experts or generators, no gap, too few seeds.
-
-    Every one of ``groups`` that is plain SAC is asked for room between it and the target; ``pairs``: seeds of which
-    both agents are there, where they are compared seed by seed.
-    """
-    results = Path(evidence.settings.results)
-    folders = sorted(
-        Path(folder).relative_to(results).as_posix() for folder in {one for group in groups for one in group.folders}
-    )
-    unit = replace(unit, folders=tuple(folders))
-    seeds = [group.metric.n for group in groups] + ([] if pairs is None else [pairs])
-    if min(seeds) == 0:
-        return unjudged(unit, NOT_RUN, "no agent has been trained for this, or none is usable")
-    for group in groups:
-        # few seeds of SAC do not show that it is on target
-        if group.stage == "train_sac" and group.metric.n >= rules["seeds"] and no_gap(group, rules):
-            return unjudged(unit, BLOCKED, "SAC alone is on target: there is no gap to close")
-    if source is not None:
-        seeds.append(len(set(evidence.settings.irl_seeds)))
-    return checked_runs(evidence, unit, rules, source, min(seeds))
-
-
-def no_gap(sac: Group, rules: Rules) -> bool:
-    """Whether plain SAC is so near to the target that nothing can be seen to close its gap."""
-    return bool(sac.distance.mean < rules["room"] * sac.target)
-
-
-def unjudged(unit: Unit, state: str, reason: str) -> Unit:
-    """The unit with the reason why it is not judged; nothing is said of what became of its agents."""
-    return replace(unit, state=state, outcome="", reason=reason)
-
-
-def checked_runs(evidence: Evidence, unit: Unit, rules: Rules, source: RewardSource | None, seeds: int) -> Unit:
-    """The unit, or why it cannot be judged, for units without agents: correlations."""
-    if seeds == 0:
-        return unjudged(unit, NOT_RUN, "no reward has been scored for this")
-    if source is not None:
-        why, failed = evidence.blocked(source, rules["needs"], rules["gates"])
-        if why:
-            return unjudged(unit, BLOCKED if failed else NOT_RUN, why)
-        if source.one_expert:
-            unit = replace(unit, notes=(*unit.notes, CONDITIONAL))
-    if seeds < rules["seeds"]:
-        return unjudged(unit, TOO_FEW, f"{seeds} of the {rules['seeds']} independent seeds a verdict needs")
-    return unit
-
-
-def works_at_home(unit: Unit, own: Group, sac: Group, needed: float) -> Unit:
-    """The unit, unless its reward fails on its own task too: then transfer is not what fails elsewhere."""
-    answer, _ = closing(own.distance, sac.distance, needed)
-    if unit.state in (MET, NOT_MET, UNCLEAR) and answer == NOT_MET:
-        return unjudged(unit, BLOCKED, "its reward does not transfer to its own task either")
-    if unit.state == MET and answer == UNCLEAR:
-        return replace(unit, state=UNCLEAR, reason=f"{unit.reason}; transfers to its own task: {UNCLEAR}")
-    return unit
 
 
 def worst(answers: Sequence[Answer]) -> str:

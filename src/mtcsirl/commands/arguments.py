@@ -8,15 +8,14 @@ from typing import Any, TypeVar
 
 from pydantic import BaseModel
 
+from mtcsirl.commands.given import Once, settings_given
 from mtcsirl.errors import UserError
 from mtcsirl.files.given import as_given, check_given
 from mtcsirl.files.storage import check_writable
 from mtcsirl.names import HIGHEST_SEED, HIGHEST_TARGET_SEED, TARGETS_PER_TASK, TASKS
 from mtcsirl.settings import Settings
-from mtcsirl.settings.loading import configured, load, overridden, read_yaml, validate
-from mtcsirl.settings.machine import check_agent, check_irl
-from mtcsirl.settings.runs import AgentRunSettings, IrlRunSettings
-from mtcsirl.settings.strict import StrictError, parse_json
+from mtcsirl.settings.loading import configured, load, overridden, validate
+from mtcsirl.settings.machine import check_run
 from mtcsirl.settings.unread import refuse, unread
 from mtcsirl.study.ablations import ABLATIONS
 from mtcsirl.study.design import ARTEFACTS
@@ -37,6 +36,7 @@ def add_verb(
         formatter_class=argparse.RawDescriptionHelpFormatter,
         description=f"{does[0].upper()}{does[1:]}.\n\nneeds:  {needs}\nwrites: {writes}",
     )
+    verb.register("action", None, Once)  # what options do that name no action
     verb.set_defaults(run=run, verb=name, only_prints=writes == "nothing")
     return verb
 
@@ -247,7 +247,7 @@ def run_settings(
     can do it, that ``--output`` holds nothing else.
     """
     if parsed.settings:
-        given = _given(parsed.settings)
+        given = settings_given(parsed)
     else:
         given = "configuration", from_study(load(parsed.config, scale=parsed.scale)).model_dump(mode="json")
     data, sources = overridden([given], parsed.set)
@@ -256,10 +256,7 @@ def run_settings(
         key = {name: getattr(parsed, name, "") for name in ("cs_reward", "method")}
         refuse(settings, unread(stage, **key), key["method"] or stage.replace("_", "-"), sources)
         check_folder(parsed.output, stage)
-    if stage and isinstance(settings, AgentRunSettings):
-        check_agent(settings)
-    if stage and isinstance(settings, IrlRunSettings):
-        check_irl(settings, len(parsed.demonstrations))
+        check_run(settings, len(getattr(parsed, "demonstrations", ())))
     return settings
 
 
@@ -282,16 +279,5 @@ def check_experiment(asked: str | None, found: str, members: Sequence[tuple[str,
 def study_settings(parsed: argparse.Namespace) -> Settings:
     """The whole configuration: ``--settings``, else ``config/config.yaml`` with its overlays; then ``--set``."""
     if parsed.settings:
-        return configured(*overridden([_given(parsed.settings)], parsed.set))
+        return configured(*overridden([settings_given(parsed)], parsed.set))
     return load(parsed.config, parsed.set, parsed.scale)
-
-
-def _given(text: str) -> tuple[str, dict[str, Any]]:
-    """JSON given on the command line, or the file of that name; with the name of either."""
-    if not text.lstrip().startswith("{"):
-        return text, read_yaml(text)
-    try:
-        data: dict[str, Any] = parse_json(text)
-    except StrictError as error:
-        raise UserError(f"--settings: {error}") from error
-    return "--settings", data

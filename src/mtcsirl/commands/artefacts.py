@@ -1,15 +1,17 @@
 """The verbs that read a study's results: tables, figures, claims, results page, report."""
 
 import argparse
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
 from mtcsirl.commands.arguments import Verbs, add_study_settings, add_verb, new_folder, study_settings
 from mtcsirl.commands.drawing import write_figure
 from mtcsirl.commands.remedy import Verb, advised
+from mtcsirl.commands.signing import Place, note, place, to_be_read
 from mtcsirl.settings import Settings
 from mtcsirl.study.ablations import ABLATIONS
-from mtcsirl.study.artefacts import HEAT_MAPS, not_rendered, sign_artefact, unsign_artefact
+from mtcsirl.study.artefacts import HEAT_MAPS, not_rendered
 from mtcsirl.study.design import ARTEFACTS, CLAIMS, design
 from mtcsirl.study.runs import AnyRun
 from mtcsirl.study.standing import DONE, standing
@@ -33,11 +35,10 @@ def register(verbs: Verbs) -> None:
         numbered=True,
     )
     _add(verbs, "figure", _figure, does="draw one of the paper's figures", writes="figure_N.pdf, .png", numbered=True)
-    ablation = _add(
-        verbs, "ablation", _ablation, does="draw an ablation", writes="NAME.csv; NAME.pdf, .png into --figures"
-    )
+    ablation = _add(verbs, "ablation", _ablation, does="draw an ablation", writes="NAME.csv, .pdf, .png")
     ablation.add_argument("name", choices=tuple(ABLATIONS), metavar="NAME", help=", ".join(ABLATIONS))
-    ablation.add_argument("--figures", type=new_folder, metavar="DIR", help="default: where the DAG puts it")
+    where = "of .pdf and .png; default: --output, else where the DAG puts it"
+    ablation.add_argument("--figures", type=new_folder, metavar="DIR", help=where)
     _add(
         verbs,
         "reward-quality",
@@ -112,10 +113,10 @@ def _table(parsed: argparse.Namespace) -> None:
 
     settings = study_settings(parsed)
     name = f"table_{parsed.number}"
+    folder, home = place(parsed.output, Path(settings.results) / "tables")
+    read = to_be_read(parsed, settings, name)
     rows = evaluation_rows(design(settings, name), settings, partial=parsed.partial)
     table = TABLES[name](rows, settings)
-    home = Path(settings.results) / "tables"
-    folder = parsed.output or home
     write_csv(folder / f"{name}.csv", table.csv())
     write_json(folder / f"{name}.json", table.as_json())
     write_text(folder / f"{name}.md", table.markdown())
@@ -125,7 +126,7 @@ def _table(parsed: argparse.Namespace) -> None:
 
         cs_reward = HEAT_MAPS[name]
         write_figure(folder / name, heat_map(cs_reward, rows, settings), heat_map_caption(cs_reward, settings))
-    _sign(parsed, settings, name, home, folder)
+    note(name, settings, [(folder, home)], partial=parsed.partial, read=read)
     print(table.markdown())
 
 
@@ -138,9 +139,11 @@ def _figure(parsed: argparse.Namespace) -> None:
 
     settings = study_settings(parsed)
     name = f"figure_{parsed.number}"
+    folder, home = place(parsed.output, Path(settings.figures))
+    read = to_be_read(parsed, settings, name)
     study = design(settings, name)
     readers = {"curves": curve_rows, "scores": score_rows, "points": point_rows}
-    frames = {what: read(study, settings, partial=parsed.partial) for what, read in readers.items()}
+    frames = {what: rows_of(study, settings, partial=parsed.partial) for what, rows_of in readers.items()}
     spec = figure_spec(name)
     data = FigureData(settings=settings, **frames)
     why = not_rendered(name, settings)
@@ -148,21 +151,9 @@ def _figure(parsed: argparse.Namespace) -> None:
         figure, caption = spec.draw(data), spec.caption(data)
     else:
         figure, caption = in_words(spec.title, why, f"snakemake --cores 2 {name}"), why_not_rendered(why)
-    home = Path(settings.figures)
-    folder = parsed.output or home
     write_figure(folder / name, figure, caption)
-    _sign(parsed, settings, name, home, folder)
+    note(name, settings, [(folder, home)], partial=parsed.partial, read=read)
     print(f"{spec.title}. {caption}")
-
-
-def _sign(parsed: argparse.Namespace, settings: Settings, name: str, home: Path, folder: Path) -> None:
-    """Note what the files ``name``.* in ``folder`` were made from, where the DAG looks for them."""
-    if folder.resolve() != home.resolve():
-        return
-    if parsed.partial:
-        unsign_artefact(name, settings)
-    else:
-        sign_artefact(name, settings, sorted(folder.glob(f"{name}.*")))
 
 
 def _reward_quality(parsed: argparse.Namespace) -> None:
@@ -170,9 +161,10 @@ def _reward_quality(parsed: argparse.Namespace) -> None:
     from mtcsirl.results.reward_quality import quality_markdown, read_quality
 
     settings = study_settings(parsed)
+    where = place(parsed.output, Path(settings.results) / "scores")
     runs = _there(design(settings).scores, settings, parsed.partial)
     rows = read_quality(runs, settings.results, settings.score.bootstrap)
-    _write_summary(parsed, settings, "scores", rows, quality_markdown(rows, " ".join(scale_notes(settings.scale))))
+    _write_summary(parsed, settings, where, rows, quality_markdown(rows, " ".join(scale_notes(settings.scale))))
 
 
 def _reward_preference(parsed: argparse.Namespace) -> None:
@@ -180,13 +172,14 @@ def _reward_preference(parsed: argparse.Namespace) -> None:
     from mtcsirl.results.preference import preferences_markdown, read_preferences
 
     settings = study_settings(parsed)
+    where = place(parsed.output, Path(settings.results) / "reward_preference")
     study = design(settings)
     runs = _there(study.transfers, settings, parsed.partial)
     experts = _there(study.experts, settings, parsed.partial)
     baselines = _there(study.baselines, settings, parsed.partial)
     rows = read_preferences(runs, experts, baselines, settings)
     text = preferences_markdown(rows, " ".join(scale_notes(settings.scale)))
-    _write_summary(parsed, settings, "reward_preference", rows, text)
+    _write_summary(parsed, settings, where, rows, text)
 
 
 def _diagnostics(parsed: argparse.Namespace) -> None:
@@ -194,8 +187,9 @@ def _diagnostics(parsed: argparse.Namespace) -> None:
     from mtcsirl.results.notes import scale_notes
 
     settings = study_settings(parsed)
+    where = place(parsed.output, Path(settings.results) / "diagnostics")
     rows = read_diagnoses(_there(design(settings).irl_runs, settings, parsed.partial), settings.results)
-    _write_summary(parsed, settings, "diagnostics", rows, diagnoses_markdown(rows, scale_notes(settings.scale)))
+    _write_summary(parsed, settings, where, rows, diagnoses_markdown(rows, scale_notes(settings.scale)))
 
 
 def _there(runs: tuple[Kind, ...], settings: Settings, partial: bool) -> tuple[Kind, ...]:
@@ -203,16 +197,16 @@ def _there(runs: tuple[Kind, ...], settings: Settings, partial: bool) -> tuple[K
     return tuple(run for run in runs if not partial or standing(run, settings).state == DONE)
 
 
-def _write_summary(parsed: argparse.Namespace, settings: Settings, place: str, rows: "pd.DataFrame", text: str) -> None:
-    """Write rows as CSV and ``text`` as Markdown, into ``place`` below the results or --output, and print it."""
+def _write_summary(
+    parsed: argparse.Namespace, settings: Settings, where: Place, rows: "pd.DataFrame", text: str
+) -> None:
+    """Write rows as CSV and ``text`` as Markdown, and print it."""
     from mtcsirl.files.storage import write_csv, write_text
 
     name = _target(parsed)
-    home = Path(settings.results) / place
-    folder = parsed.output or home
-    write_csv(folder / f"{name}.csv", rows)
-    write_text(folder / f"{name}.md", text)
-    _sign(parsed, settings, name, home, folder)
+    write_csv(where[0] / f"{name}.csv", rows)
+    write_text(where[0] / f"{name}.md", text)
+    note(name, settings, [where], partial=parsed.partial)
     print(text)
 
 
@@ -223,14 +217,15 @@ def _ablation(parsed: argparse.Namespace) -> None:
     from mtcsirl.study.design import variants
 
     settings, name = study_settings(parsed), parsed.name
+    csv = place(parsed.output, Path(settings.results) / "ablations")
+    figures = place(parsed.figures or parsed.output, Path(settings.figures))
     shown = variants(settings, name)
     frames = {v: evaluation_rows(study, settings, partial=parsed.partial) for v, study in shown.items()}
     rows = variant_rows(frames)
-    home, figures = Path(settings.results) / "ablations", parsed.figures or Path(settings.figures)
-    write_csv((parsed.output or home) / f"{name}.csv", rows)
+    write_csv(csv[0] / f"{name}.csv", rows)
     text = caption(name, rows, settings)
-    write_figure(figures / name, draw(name, rows, settings), text)
-    _sign(parsed, settings, name, home, parsed.output or home)
+    write_figure(figures[0] / name, draw(name, rows, settings), text)
+    note(name, settings, [csv, figures], partial=parsed.partial)
     print(text)
 
 
@@ -240,14 +235,14 @@ def _claims(parsed: argparse.Namespace) -> None:
     from mtcsirl.files.storage import write_json, write_text
 
     settings = study_settings(parsed)
+    folder, home = place(parsed.output, Path(settings.results) / "claims")
+    read = to_be_read(parsed, settings, CLAIMS)
     findings = _judged(settings, parsed.partial)
-    home = Path(settings.results) / "claims"
-    folder = parsed.output or home
     text = claims_markdown(findings, settings)
     write_json(folder / "claims.json", claims_json(findings, settings))
     write_text(folder / "claims.md", text)
     write_figure(folder / "claims", claims_figure(findings, settings), caption())
-    _sign(parsed, settings, "claims", home, folder)
+    note(CLAIMS, settings, [(folder, home)], partial=parsed.partial, read=read)
     print(text)
 
 
@@ -271,10 +266,11 @@ def _results(parsed: argparse.Namespace) -> None:
     from mtcsirl.tables import TABLES
 
     settings = study_settings(parsed)
+    folder, _ = place(parsed.output, Path(settings.results))
     rows = {name: evaluation_rows(design(settings, name), settings, partial=parsed.partial) for name in TABLES}
     tables = {name: table(rows[name], settings) for name, table in TABLES.items()}
     made = made_with(design(settings), settings)
-    page = (parsed.output or Path(settings.results)) / "results.md"
+    page = folder / "results.md"
     write_text(page, results_page(_judged(settings, parsed.partial), tables, settings, provenance=made))
     print(page)
 
@@ -285,9 +281,11 @@ def _report(parsed: argparse.Namespace) -> None:
     from mtcsirl.report.page import build_report
 
     settings = study_settings(parsed)
-    home = Path(settings.results) / "report"
-    page = (parsed.output or home) / "index.html"
-    write_text(page, build_report(collect(settings, page, partial=parsed.partial)))
-    if not parsed.partial and page.parent.resolve() == home.resolve():
-        sign_artefact("report", settings, [page])
+    folder, home = place(parsed.output, Path(settings.results) / "report")
+    page = folder / "index.html"
+    data = collect(settings, page, partial=parsed.partial)
+    write_text(page, build_report(data))
+    note("report", settings, [(folder, home)], partial=parsed.partial, files=page.name)
+    for caution in data.cautions:
+        print(f"mtcsirl: {caution}", file=sys.stderr)
     print(page)

@@ -25,6 +25,7 @@ from mtcsirl.commands.arguments import (
 from mtcsirl.errors import UserError
 from mtcsirl.names import EXPERIMENTS
 from mtcsirl.study.folders import check_without_run
+from mtcsirl.study.inputs import check_demonstrations, check_evaluation
 
 AGENT_FILES = "policy.safetensors/.json, curve.csv, evaluation.csv, gate.json, settings.json, provenance.json"
 
@@ -99,6 +100,7 @@ def _collect_demonstrations(verbs: Verbs) -> None:
         of_expert = partial(demonstration_run, cs_reward=parsed.cs_reward)
         settings = run_settings(parsed, DemonstrationRunSettings, of_expert, "collect_demonstrations")
         shown = Demonstrations(Expert(parsed.cs_reward, parsed.task, parsed.target, parsed.seed))
+        check_evaluation(parsed.expert)
         collect_demonstrations(settings, shown, parsed.expert, parsed.output, wanted=parsed.identity)
 
     verb = add_verb(
@@ -125,6 +127,7 @@ def _learn_reward(verbs: Verbs) -> None:
         members = []
         for file in parsed.demonstrations:
             with demonstrations_given(file):
+                check_demonstrations(file)
                 members.append(member_of(file))
         experiment, source = experiment_of(members)
         if (parsed.experiment, experiment) == ("multi_target", "single_target"):
@@ -199,6 +202,8 @@ def _score_reward(verbs: Verbs) -> None:
         settings = run_settings(parsed, ScoreRunSettings, score_run, "score_reward")
         scoring = Scoring(parsed.cs_reward, parsed.task, parsed.target, parsed.seed)
         policies = parsed.expert, parsed.baseline
+        for folder in (*parsed.expert, *parsed.baseline):
+            check_evaluation(folder)
         score_reward(settings, scoring, parsed.reward, *policies, parsed.output, wanted=parsed.identity)
 
     verb = add_verb(
@@ -230,7 +235,7 @@ def _evaluate(verbs: Verbs) -> None:
         from mtcsirl.settings.runs import AgentRunSettings, baseline_run
         from mtcsirl.settings.unread import EVALUATE, refuse_others
 
-        check_without_run(parsed.output, "evaluation.csv")
+        check_without_run(parsed.output)
         settings = run_settings(parsed, AgentRunSettings, lambda s: baseline_run(s, parsed.task))
         refuse_others(override({}, parsed.set), EVALUATE, "evaluate")
         policy = load_policy(parsed.policy)

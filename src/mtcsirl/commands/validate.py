@@ -25,9 +25,12 @@ def register(verbs: Verbs) -> None:
 def _validate(parsed: argparse.Namespace) -> None:
     from mtcsirl.files.storage import write_csv
     from mtcsirl.settings.loading import configured
+    from mtcsirl.study.folders import check_without_run
     from mtcsirl.validation.figure import caption, draw
     from mtcsirl.validation.recovery import ValidationSettings, recover
 
+    for folder in (parsed.output, parsed.figures):
+        check_without_run(folder)
     settings = None if parsed.results is None else configured({"results": str(parsed.results)})
     findings = recover(ValidationSettings(), processes=parsed.processes)
     for name, frame in findings._asdict().items():

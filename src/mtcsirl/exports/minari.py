@@ -12,6 +12,7 @@ import pandas as pd
 
 from mtcsirl.episodes.demonstrations import read_demonstrations
 from mtcsirl.errors import UserError
+from mtcsirl.study.inputs import check_demonstrations
 from mtcsirl.worlds.environments import ACTION_SIZE, OBSERVATION_SIZE
 
 NAME = re.compile(r"([A-Za-z0-9_-]+/)*[A-Za-z0-9_-]+-v[0-9]+")
@@ -25,11 +26,13 @@ def export_minari(demonstrations: Path | str, folder: Path | str, name: str | No
     infos hold ``success`` per step. The dataset appears as a whole or not at all.
 
     Raises:
-        UserError: Minari is not installed, the id is none, the file is not readable, or the dataset exists.
+        UserError: Minari is not installed, the id is none, the file is not readable or names no task and target of
+            Meta-World, or the dataset exists.
     """
     folder = Path(folder)
     if name is not None:
         _check_name(name)
+    check_demonstrations(demonstrations, success=True)
     frame = read_demonstrations(demonstrations)
     task, target = frame["task"].iloc[0], int(frame["target"].iloc[0])
     name = name or f"mtcsirl/{task}-t{target}-v0"

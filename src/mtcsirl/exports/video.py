@@ -14,6 +14,7 @@ import PIL.ImageFont
 from mtcsirl.episodes.policy import Policy, load_policy
 from mtcsirl.errors import UserError
 from mtcsirl.files import storage
+from mtcsirl.names import TARGETS_PER_TASK, TASKS
 from mtcsirl.worlds.environments import EPISODE_STEPS, HAND, OBSERVATION_MAPS, STEP_SECONDS, make_environment
 from mtcsirl.worlds.rendering import Image, SceneRenderer
 
@@ -38,15 +39,26 @@ def clip_of(
 ) -> Clip:
     """The policy in a run folder; task and target from ``evaluation.csv`` beside it, unless given.
 
-    Raises UserError when there is no readable policy, or no task is given and none is written down.
+    Raises UserError when there is no readable policy, or task or target is not given and none is written down.
     """
     folder = Path(folder)
     policy = load_policy(folder)
     if task is None or target is None:
-        evaluation = storage.read_csv(folder / "evaluation.csv", ("task", "target"))
-        task = task if task is not None else str(evaluation["task"].iloc[0])
-        target = target if target is not None else int(evaluation["target"].iloc[0])
+        own_task, own_target = _evaluated_on(folder / "evaluation.csv")
+        task = own_task if task is None else task
+        target = own_target if target is None else target
     return Clip(policy, task, target, label or f"{task}, target {target}")
+
+
+def _evaluated_on(file: Path) -> tuple[str, int]:
+    """Task and target of the first row of an evaluation."""
+    rows = storage.read_csv(file, ("task", "target"))
+    if rows.empty:
+        raise UserError(f"{file}: has no row; say by --task and --target what to show")
+    task, target = rows["task"].iloc[0], rows["target"].iloc[0]
+    if task not in TASKS or target not in range(TARGETS_PER_TASK):
+        raise UserError(f"{file}: task {task!r}, target {target}: no such task and target; give --task and --target")
+    return str(task), int(target)
 
 
 def render_video(

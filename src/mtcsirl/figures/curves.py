@@ -1,12 +1,13 @@
 """Learning curves over environment steps: mean and t-interval over seeds, one series per method."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.patches import Patch
 
 from mtcsirl.figures.style import (
     NO_RUNS,
@@ -18,12 +19,15 @@ from mtcsirl.figures.style import (
     panel_title,
     quantity,
     quantity_label,
+    share_axis,
     step_axis,
     target_of,
 )
 from mtcsirl.results.statistics import summarise, t_interval
 
 BINS = 40
+AGENT = ["task", "seed"]
+INTERVAL = Patch(facecolor="0.5", alpha=0.3, label="95 % t-interval")
 
 
 @dataclass(frozen=True)
@@ -55,9 +59,10 @@ def summarise_curve(rows: pd.DataFrame, bins: int = BINS) -> pd.DataFrame:
     """
     if rows.empty:
         return pd.DataFrame(columns=["step", "mean", "low", "high", "n"])
-    end = rows.groupby(["task", "seed"])["step"].max().min()
+    steps = rows.groupby(AGENT)["step"]
+    end, bins = steps.max().min(), min(bins, steps.nunique().min())
     rows = rows[rows["step"] <= end]
-    edges = np.linspace(rows["step"].min() - 1, end, min(bins, rows["step"].nunique()) + 1)
+    edges = np.linspace(rows["step"].min() - 1, end, bins + 1)
     binned = rows.assign(bin=np.searchsorted(edges, rows["step"], side="left"))
     per_run = binned.groupby(["bin", "seed", "task"])[["step", "value"]].mean()
     per_seed = per_run.groupby(["bin", "seed"]).mean()
@@ -80,7 +85,13 @@ def curve_panel(axes: Axes, index: int, metric: str, series: Sequence[Series], s
     ``success``: the same agents' rows of success.
     """
     target = target_of(metric)
-    draw_curves(axes, series, metric, target)
+    shortest, longest = budgets(series)
+    shares = any(len(set(_last_steps(one.rows))) > 1 for one in series)
+    draw_curves(axes, [own_shares(one) for one in series] if shares else series, metric, target)
+    if shares:
+        share_axis(axes, shortest, longest)
+    else:
+        step_axis(axes)
     panel_title(axes, index, curve_title(metric, target, series))
     notes = missing_note(series) + tasks_note(series) + success_note(success)
     return [f"({letter(index)}) {note}" for note in notes]
@@ -97,7 +108,10 @@ def draw_curves(axes: Axes, series: Sequence[Series], metric: str, target: float
         curve = summarise_curve(one.rows)
         if curve.empty:
             continue
-        axes.fill_between(curve["step"], curve["low"], curve["high"], color=one.look.colour, alpha=0.18, linewidth=0)
+        if curve["low"].notna().any():
+            axes.fill_between(
+                curve["step"], curve["low"], curve["high"], color=one.look.colour, alpha=0.18, linewidth=0
+            )
         axes.plot(
             curve["step"],
             curve["mean"],
@@ -109,21 +123,41 @@ def draw_curves(axes: Axes, series: Sequence[Series], metric: str, target: float
         )
         heights.append(curve["mean"].max())
     if target is not None:
-        axes.axhline(target, color=TARGET_COLOUR, linewidth=1)
+        axes.axhline(target, color=TARGET_COLOUR, linewidth=1, label="target")
     axes.set_ylim(0, 1.2 * max(heights, default=1.0))
     axes.set_xlim(left=0)
     axes.set_ylabel(quantity_label(metric))
-    step_axis(axes)
     axes.locator_params(axis="x", nbins=4)
     if all(one.rows.empty for one in series):
         empty_panel(axes, NO_RUNS if any(one.expected for one in series) else NOT_ASKED)
 
 
-def add_legend(figure: Figure, axes: list[Axes]) -> None:
-    """One legend above all panels, each method once."""
+def own_shares(series: Series) -> Series:
+    """The series with each row's ``step`` in percent of its own run's: tasks have budgets of their own.
+
+    A mean over tasks that ended with the shortest run would show the others half trained.
+    """
+    share = 100 * series.rows["step"] / series.rows.groupby(AGENT)["step"].transform("max")
+    return replace(series, rows=series.rows.assign(step=share))
+
+
+def budgets(series: Sequence[Series]) -> tuple[int, int]:
+    """The fewest and the most steps of a run of any series; zeros where there is none."""
+    last = [int(step) for one in series for step in _last_steps(one.rows)]
+    return min(last, default=0), max(last, default=0)
+
+
+def _last_steps(rows: pd.DataFrame) -> pd.Series:
+    return rows.groupby(AGENT)["step"].max()
+
+
+def add_legend(figure: Figure, axes: list[Axes], tasks: str) -> None:
+    """One legend above all panels, each method once, the target and the band last; ``tasks`` above it."""
     entries = {label: line for panel in axes for line, label in zip(*panel.get_legend_handles_labels(), strict=True)}
+    order = sorted(entries.values(), key=lambda line: line.get_label() == "target")
+    bands = [INTERVAL] if any(panel.collections for panel in axes) else []
     if entries:
-        figure.legend(entries.values(), entries.keys(), loc="outside upper center", ncols=len(entries))
+        figure.legend(handles=order + bands, loc="outside upper center", ncols=len(order + bands), title=tasks)
 
 
 def missing_note(series: Sequence[Series]) -> list[str]:
@@ -154,14 +188,13 @@ def success_note(series: Sequence[Series]) -> list[str]:
     Curves of a cs-reward do not show an agent that has the behaviour and has lost its task.
     """
     said = [f"{one.label} {100 * _last_tenth(one.rows):.0f} %" for one in series if len(one.rows)]
-    return [f"success at the end of training: {', '.join(said)}"] if said else []
+    return [f"success in the last tenth of training: {', '.join(said)}"] if said else []
 
 
 def _last_tenth(rows: pd.DataFrame) -> float:
     """Mean over agents of each one's mean after nine tenths of its steps; every task counts once."""
-    agent = ["task", "seed"]
-    late = rows[rows["step"] > 0.9 * rows.groupby(agent)["step"].transform("max")]
-    return float(late.groupby(agent)["value"].mean().groupby("task").mean().mean())
+    late = rows[rows["step"] > 0.9 * rows.groupby(AGENT)["step"].transform("max")]
+    return float(late.groupby(AGENT)["value"].mean().groupby("task").mean().mean())
 
 
 def curve_title(metric: str, target: float | None, series: Sequence[Series]) -> str:

@@ -25,7 +25,7 @@ _SCATTER = "velocity"
 def draw(data: FigureData) -> Figure:
     """Learning curves of Expert, MT-CSIRL (transferred) and SAC, mean over the unseen tasks, and the scatter."""
     metrics = data.cs_rewards
-    figure = new_figure(TEXT_WIDTH, 2.15)
+    figure = new_figure(TEXT_WIDTH, 2.35)
     axes = figure.subplots(1, len(metrics) + 1, squeeze=False)[0]
     notes: list[str] = []
     for index, metric in enumerate(metrics):
@@ -33,7 +33,8 @@ def draw(data: FigureData) -> Figure:
         notes += curve_panel(axes[index], index, metric, series, success)
     panel_title(axes[-1], len(metrics), "Rewards' correlation")
     draw_scatter(axes[-1], multi_task.correlation(data, _SCATTER), multi_task.METHOD, _SCATTER)
-    add_legend(figure, list(axes[:-1]))
+    unseen = data.settings.multi_task.unseen_tasks
+    add_legend(figure, list(axes[:-1]), f"{'mean over ' if len(unseen) > 1 else ''}{', '.join(unseen)}")
     add_notes(figure, notes + scale_notes(data.settings.scale))
     return figure
 
@@ -49,10 +50,10 @@ def caption(data: FigureData) -> str:
         f"{letters}: Expert maximises r_task and the true cs-reward, MT-CSIRL r_task and the reward "
         f"learned from {', '.join(data.settings.multi_task.train_tasks)}, SAC r_task alone; training episodes of the "
         "stochastic policy. Red line: target. Lines and bands: mean and 95 % t-interval over seeds "
-        f"({numbers}); bands are cut off at the frame, curves end where the shortest run does. "
-        "Success below the panels: of training episodes in the last tenth of each agent's steps. "
-        f"({letter(len(metrics))}) {scatter_caption(found, _SCATTER)} "
-        f"Scored on {data.settings.multi_task.unseen_tasks[0]}."
+        f"({numbers}); bands are cut off at the frame. Tasks have budgets of their own, so that where these differ the "
+        "horizontal axis is the share of each agent's own steps. Success below the panels: of training episodes; "
+        "tables have that of evaluation episodes. "
+        f"({letter(len(metrics))}) {scatter_caption(found, _SCATTER)}"
     )
 
 

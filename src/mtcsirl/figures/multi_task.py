@@ -45,4 +45,5 @@ def curve_series(data: FigureData, metric: str, shown: str = "") -> list[Series]
 
 def correlation(data: FigureData, cs_reward: str) -> Correlation:
     """The multi-task reward against the truth on the first unseen task."""
-    return select_correlation(data, experiment=EXPERIMENT, method=METHOD, cs_reward=cs_reward, source=SOURCE)
+    task = data.settings.multi_task.unseen_tasks[0]
+    return select_correlation(data, experiment=EXPERIMENT, method=METHOD, cs_reward=cs_reward, source=SOURCE, task=task)

@@ -36,7 +36,7 @@ TRANSITION_SETS = {
 
 @dataclass(frozen=True)
 class Correlation:
-    """Points and correlation of one learned reward on one transition set, all seeds.
+    """Points and correlation of one learned reward on one transition set of ``task``, all seeds.
 
     ``partial``: the correlation given r_task, as r alone may be that of the task reward. ``paper``: its r, or NaN.
     """
@@ -44,6 +44,7 @@ class Correlation:
     points: pd.DataFrame
     estimate: Estimate
     partial: Estimate
+    task: str
     transitions: str
     paper: float
 
@@ -79,17 +80,19 @@ def select_correlation(
     method: str,
     cs_reward: str,
     source: str,
+    task: str,
     transitions: str = PRIMARY_TRANSITIONS,
 ) -> Correlation:
     """Points, Pearson's r and the partial r given r_task of the learned reward of ``source`` on ``transitions``.
 
+    ``task``: the one on which these rewards are scored, for the words alone.
     Over seeds r is averaged on Fisher's z scale with a t-interval; one seed keeps the interval that its own row has.
     """
     wanted = {"experiment": experiment, "method": method, "cs_reward": cs_reward, "source": source}
     points = rows_where(data.points, wanted | {"transitions": transitions})
     scores = rows_where(data.scores, wanted | {"transitions": transitions, "reward": "learned"})
     paper = load_published().correlation(experiment, cs_reward).mean
-    return Correlation(points, _over_seeds(scores, "pearson"), _over_seeds(scores, "partial"), transitions, paper)
+    return Correlation(points, _over_seeds(scores, "pearson"), _over_seeds(scores, "partial"), task, transitions, paper)
 
 
 def _over_seeds(scores: pd.DataFrame, statistic: str) -> Estimate:
@@ -100,11 +103,12 @@ def _over_seeds(scores: pd.DataFrame, statistic: str) -> Estimate:
     return mean_correlation(rows["value"])
 
 
-def draw_scatter(axes: Axes, found: Correlation, method: str, cs_reward: str) -> None:
+def draw_scatter(axes: Axes, found: Correlation, method: str, cs_reward: str, words_share: float = 0.5) -> None:
     """Truth on the horizontal, learned on the vertical axis; one point per transition.
 
     A learned reward is known up to scale and offset, so each seed's is standardised (mean 0, standard deviation 1).
-    The line is the least-squares fit over the seeds, which all weigh the same.
+    The line is the least-squares fit over the seeds, which all weigh the same. The words stand above the points, in
+    the upper ``words_share`` of the panel.
     """
     axes.set_xlabel(f"true cs-reward,\n{quantity_label(cs_reward)}")
     axes.set_ylabel("learned cs-reward\n(standardised per seed)")
@@ -129,14 +133,12 @@ def draw_scatter(axes: Axes, found: Correlation, method: str, cs_reward: str) ->
         axes.plot(ends, slope * ends + offset, color="black", linewidth=1, linestyle="--")
     low, high = np.percentile(standard["learned"], [0.2, 99.8])
     margin = 0.08 * max(high - low, 1e-6)
-    axes.set_ylim(low - margin, high + 8 * margin)  # room for the words above the points
-    paper = "" if np.isnan(found.paper) else f"\npaper: r = {found.paper:.2f}"
-    lines = (found.words(), found.partial_words(), found.transition_name, found.counts())
-    words = "\n".join(filter(None, lines)) + paper
-    axes.text(
-        0.03, 0.98, words, transform=axes.transAxes, va="top", fontsize=6,
-        bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1},
-    ).set_in_layout(False)  # fmt: skip
+    axes.set_ylim(low - margin, low - margin + (high - low + 2 * margin) / (1 - words_share))
+    paper = "" if np.isnan(found.paper) else f"paper: r = {found.paper:.2f}"
+    where = f"{found.task}, {found.counts()}"
+    lines = filter(None, (found.words(), found.partial_words(), paper, found.transition_name, where))
+    words = axes.text(0.03, 0.98, "\n".join(lines), transform=axes.transAxes, va="top", fontsize=6)
+    words.set_in_layout(False)
 
 
 def standardise(points: pd.DataFrame) -> pd.DataFrame:
@@ -165,7 +167,7 @@ def scatter_caption(found: Correlation, cs_reward: str) -> str:
         return f"True against learned {quantity(cs_reward)} cs-reward{paper}: {NO_RUNS}."
     partial = found.partial_words() and f"{found.partial_words()}, "
     return (
-        f"True against learned {quantity(cs_reward)} cs-reward on {found.transition_name}: "
+        f"True against learned {quantity(cs_reward)} cs-reward on {found.transition_name} of {found.task}: "
         f"Pearson {found.words()}{paper}, {partial}{interval}, {found.counts()} with up to {found.per_seed:,} "
         "transitions each; "
         f"at most {SHOWN_POINTS:,} points are drawn, without the outermost 0.4 %. The learned reward is standardised "
@@ -177,6 +179,6 @@ def scatter_caption(found: Correlation, cs_reward: str) -> str:
 def scatter_figure(scale: str, found: Correlation, method: str, cs_reward: str) -> Figure:
     """A figure of one scatter."""
     figure = new_figure(0.52 * TEXT_WIDTH, 2.4)
-    draw_scatter(figure.subplots(), found, method, cs_reward)
+    draw_scatter(figure.subplots(), found, method, cs_reward, words_share=0.33)
     add_notes(figure, scale_notes(scale))
     return figure

@@ -67,6 +67,7 @@ def correlation(data: FigureData, task: str, cs_reward: str) -> Correlation:
         method=data.settings.single_target.method,
         cs_reward=cs_reward,
         source=task,
+        task=task,
     )
 
 
@@ -74,7 +75,7 @@ def correlation(data: FigureData, task: str, cs_reward: str) -> Correlation:
 def draw(data: FigureData, artefact: str, task: str, metrics: list[str], *, scatter: bool = False) -> Figure:
     """One panel of learning curves per cs-reward in ``metrics``, and the scatter if asked for."""
     panels = len(metrics) + scatter
-    figure = new_figure(TEXT_WIDTH, 2.15 if panels > 2 else 2.45)
+    figure = new_figure(TEXT_WIDTH, 2.35 if panels > 2 else 2.65)
     axes = figure.subplots(1, panels, squeeze=False)[0]
     notes: list[str] = []
     for index, metric in enumerate(metrics):
@@ -85,7 +86,7 @@ def draw(data: FigureData, artefact: str, task: str, metrics: list[str], *, scat
         panel_title(axes[-1], panels - 1, "Rewards' correlation")
         method = data.settings.single_target.method
         draw_scatter(axes[-1], correlation(data, task, SCATTER_CS_REWARD), method, SCATTER_CS_REWARD)
-    add_legend(figure, axes[: len(metrics)])
+    add_legend(figure, axes[: len(metrics)], task)
     add_notes(figure, notes + scale_notes(data.settings.scale))
     return figure
 
@@ -101,8 +102,8 @@ def caption(data: FigureData, artefact: str, task: str, metrics: list[str], *, s
         "(IRL agent), a new agent trained from scratch on r_task + the learned cs-reward (Transferred) and an agent "
         "without any cs-reward (SAC), training episodes of the stochastic policy. Red line: target. "
         f"Lines and bands: mean and 95 % t-interval over seeds ({numbers}); bands are cut off at the frame, "
-        "curves end where the shortest run does. Success below the panels: of training episodes in the last tenth of "
-        "each agent's steps."
+        "curves end where the shortest run does. Success below the panels: of training episodes; tables have that of "
+        "evaluation episodes."
     )
     warm_up = warm_up_steps(data, task)
     if warm_up:

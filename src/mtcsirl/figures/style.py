@@ -143,6 +143,11 @@ def step_axis(axes: Axes) -> None:
     axes.xaxis.set_major_formatter(lambda step, _: f"{step / 1000:g}k" if step else "0")
 
 
+def share_axis(axes: Axes, shortest: int, longest: int) -> None:
+    """Label the horizontal axis as percent of each agent's own steps, of which there are so many."""
+    axes.set_xlabel(f"% of an agent's {shortest / 1000:g}k to {longest / 1000:g}k steps")
+
+
 def empty_panel(axes: Axes, reason: str) -> None:
     """Say in an empty panel why it is empty."""
     axes.set_xticks([])

@@ -104,7 +104,7 @@ class GateLine:
     cs_reward: str
     passed: int
     agents: int
-    success: float
+    success: float | None
     metric: float | None
     folders: tuple[str, ...] = ()
 
@@ -150,5 +150,7 @@ class ReportData:
     """All verdicts on one page, where it has been drawn."""
     rows: Mapping[str, str] = field(default_factory=dict)
     """Folder of a run -> address of its rows, of those that are there."""
+    cautions: tuple[str, ...] = ()
+    """Runs and artefacts that are left out, or older than their runs: why, and the way out; one line each."""
     beforehand: str = ""
     """What was fixed before the runs and what was not."""

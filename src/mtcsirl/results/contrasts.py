@@ -10,7 +10,7 @@ import numpy as np
 from scipy import stats
 from scipy.optimize import brentq
 
-from mtcsirl.results.statistics import ONE_SIDED, Array, Estimate, Summary, Welch, contrast
+from mtcsirl.results.statistics import HUGE, ONE_SIDED, Array, Estimate, Summary, Welch, contrast
 
 
 class Nearness(NamedTuple):
@@ -101,10 +101,9 @@ def fieller_of(terms: Sequence[tuple[float, Summary]], denominator: Summary, con
     numerator, n = sum(weight * summary.mean for weight, summary in terms), terms[0][1].n
     value = numerator / denominator.mean if denominator.mean else np.nan
     samples = [denominator, *(summary for _, summary in terms)]
-    if min(summary.n for summary in samples) < 2 or not np.isfinite(value):
+    known = all(one.n >= 2 and one.std < HUGE for one in samples)
+    if not known or not np.isfinite(value):
         return Estimate(value, np.nan, np.nan, n)
-    if not any(summary.std for summary in samples):
-        return Estimate(value, value, value, n)
 
     def excess(angle: float) -> float:
         """|d cos - d_0 sin| minus what the contrast accepts; rho is the tangent of the angle."""
@@ -115,6 +114,8 @@ def fieller_of(terms: Sequence[tuple[float, Summary]], denominator: Summary, con
     if excess(np.pi / 2) <= 0:
         return Estimate(value, -np.inf, np.inf, n)
     best = float(np.arctan(value))
+    if excess(best) >= 0:  # no spread, or none that floating point can tell from it
+        return Estimate(value, value, value, n)
     low, high = (np.tan(brentq(excess, *sorted((best, side * np.pi / 2)))) for side in (-1, 1))
     return Estimate(value, float(low), float(high), n)
 

@@ -1,13 +1,16 @@
 """``points.parquet`` of a score as evidence: single transitions that count alike."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 
 from mtcsirl.files import storage
+from mtcsirl.results.moments import POLICIES
 
 EPISODE = ["transitions", "agent", "episode"]
+REWARDS = ["learned", "truth", "task_reward"]
 
 
 def read_points(path: Path | str, columns: Sequence[str]) -> pd.DataFrame:
@@ -27,3 +30,33 @@ def without_first(points: pd.DataFrame, episode: list[str] = EPISODE) -> pd.Data
     """``points`` without the first of each episode, which the columns ``episode`` name together."""
     first, more = ~points.duplicated(episode), points.duplicated(episode, keep=False)
     return points[~(first & more)]
+
+
+def usable(points: pd.DataFrame) -> tuple[pd.DataFrame, tuple[str, ...]]:
+    """The points of IRL seeds that can be judged, and why the others cannot.
+
+    A seed needs every set of transitions and numbers throughout, and points that are not another seed's.
+    """
+    if not len(points):
+        return points, ()
+    kept: dict[int, pd.DataFrame] = {}
+    why: list[str] = []
+    for seed, own in points.groupby("seed", sort=True):
+        fault = _fault(own, kept)
+        if fault:
+            why.append(f"IRL seed {seed} left out: {fault}")
+        else:
+            kept[int(str(seed))] = own
+    return points[points["seed"].isin(list(kept))], tuple(why)
+
+
+def _fault(own: pd.DataFrame, before: Mapping[int, pd.DataFrame]) -> str:
+    values = own[REWARDS].to_numpy(dtype=float)
+    bad = [name for name, known in zip(REWARDS, np.isfinite(values).all(axis=0), strict=True) if not known]
+    lost = [name for name in POLICIES if name not in set(own["transitions"])]
+    twin = [seed for seed, other in before.items() if np.array_equal(values, other[REWARDS].to_numpy(dtype=float))]
+    if bad:
+        return f"not all of its {', '.join(bad)} are numbers"
+    if lost:
+        return f"no transitions of {', '.join(lost)}"
+    return f"its points are those of seed {twin[0]}" if twin else ""

@@ -103,10 +103,12 @@ def _task_reward(learned: LearnedReward, run: Transfer, seen: Transitions) -> np
 
 
 def preferences(rows: pd.DataFrame) -> pd.DataFrame:
-    """One row per reward and task: means over new agents, what they earn beyond the expert, and how many do.
+    """One row per reward and task: means over pairs, what new agents earn beyond the expert, and how many do.
 
-    ``beyond``: paid to the new agent less paid to the expert of its seed, mean with t-interval; ``prefers`` of ``n``
-    agents earn more than their expert, ``prefers_from_start`` do from resets. Agents without an expert do not count.
+    A pair is a new agent with the expert of its seed: agents without one do not count, in the means neither. ``n``:
+    the pairs; ``n sac``: those with plain SAC beside them, over which its means are.
+    ``beyond``: paid to the new agent less paid to the expert, mean with t-interval; ``prefers`` of ``n`` agents earn
+    more than their expert, ``prefers_from_start`` do from resets.
     ``even_at``: at this part of lambda the two behaviours would earn the same; below it the one with more r_task earns
     more, if agents on that weight kept to these two, which they need not.
     """
@@ -118,15 +120,19 @@ def _preferred(rows: pd.DataFrame) -> Iterator[dict[str, Any]]:
         by = {str(name): own.set_index("seed") for name, own in group.groupby("behaviour")}
         if NEW not in by or EXPERT not in by:
             continue
-        beyond = (by[NEW]["paid"] - by[EXPERT]["paid"]).dropna()
-        from_start = (by[NEW]["paid_from_start"] - by[EXPERT]["paid_from_start"]).dropna()
+        more = (by[NEW][list(VALUES)] - by[EXPERT][list(VALUES)]).dropna()
+        if more.empty:
+            continue
+        by = {name: own[own.index.isin(more.index)] for name, own in by.items()}
+        beyond, from_start = more["paid"], more["paid_from_start"]
         summary = summarise(beyond)
         low, high = t_interval(summary)
         named = dict(zip(KEY, key, strict=True))
         means = {f"{part} {name}": own[part].mean() for name, own in by.items() for part in VALUES}
         verdict = {"beyond": summary.mean, "low": low, "high": high, "prefers": int((beyond > 0).sum())}
         verdict["even_at"] = _even_at(*(by[name][["r_task", "f"]].mean() for name in (NEW, EXPERT)))
-        yield named | means | verdict | {"prefers_from_start": int((from_start > 0).sum()), "n": len(beyond)}
+        counts = {"n": len(more), f"n {SAC}": len(by.get(SAC, ()))}
+        yield named | means | verdict | {"prefers_from_start": int((from_start > 0).sum())} | counts
 
 
 def _even_at(new: pd.Series, expert: pd.Series) -> float:
@@ -168,7 +174,9 @@ def _cells(row: dict[Hashable, Any]) -> Iterator[str]:
     yield f"{row[f'success {NEW}']:.2f}"
     for name in BEHAVIOURS:
         pays = row.get(f"f {name}", np.nan)
-        yield "" if np.isnan(pays) else f"{row[f'r_task {name}']:.1f}, {pays:.1f}"
+        few = name == SAC and row[f"n {SAC}"] < row["n"]
+        count = f" (n = {row[f'n {SAC}']})" if few else ""
+        yield "" if np.isnan(pays) else f"{row[f'r_task {name}']:.1f}, {pays:.1f}{count}"
     interval = f" [{row['low']:.1f}, {row['high']:.1f}]" if row["n"] > 1 else ""
     yield f"{row['beyond']:.1f}{interval}"
     yield from (f"{row[name]} of {row['n']}" for name in ("prefers", "prefers_from_start"))

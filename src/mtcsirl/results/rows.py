@@ -246,15 +246,24 @@ def _passed(gate: Path, agent: dict[str, Any]) -> bool:
         UserError: the file is no gate's.
     """
     verdict = _verdict(gate)
-    members = {(m.get("task"), m.get("target")): m for m in verdict.get("members", [])}
-    return bool(members.get((agent["task"], agent["target"]), verdict)["passed"])
+    member = agent["task"], agent["target"]
+    own = [one for one in verdict.get("members", []) if (one.get("task"), one.get("target")) == member]
+    return bool((own or [verdict])[-1]["passed"])
 
 
 def _verdict(gate: Path) -> dict[str, Any]:
-    verdict = storage.read_json(gate)
-    if not isinstance(verdict, dict) or not {"passed", "success", "metric"} <= set(verdict):
+    verdict: dict[str, Any] = storage.read_json(gate)
+    members = verdict.get("members", []) if isinstance(verdict, dict) else None
+    if not isinstance(members, list) or not all(_is_verdict(one) for one in (verdict, *members)):
         raise UserError(f"{gate}: not the verdict of a gate; delete it and make its run again")
     return verdict
+
+
+def _is_verdict(said: Any) -> bool:
+    """Whether ``said`` is what a gate says of an agent; any text as ``passed`` would count as yes."""
+    kinds: dict[str, Any] = {"passed": bool, "success": float | int | None, "metric": float | int | None}
+    fits = isinstance(said, dict) and all(name in said and isinstance(said[name], kinds[name]) for name in kinds)
+    return fits and isinstance(said.get("diverged", 0), int)
 
 
 def _mark_equal_seeds(rows: pd.DataFrame) -> pd.DataFrame:

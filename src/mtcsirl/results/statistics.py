@@ -57,6 +57,8 @@ class Welch(NamedTuple):
 UNKNOWN_INTERVAL = Interval(np.nan, np.nan)
 ONE_SIDED = 0.90
 """Confidence of the interval whose two ends are one-sided 95 % bounds."""
+HUGE = 1e150
+"""A number whose square is none: nothing is tested with it."""
 
 
 def summarise(values: ArrayLike) -> Summary:
@@ -95,7 +97,7 @@ def contrast(*terms: tuple[float, Summary], constant: float = 0.0, confidence: f
     from scipy import stats
 
     value = constant + sum(weight * summary.mean for weight, summary in terms)
-    if any(summary.n < 2 for _, summary in terms):
+    if not all(summary.n >= 2 and abs(weight * summary.std) < HUGE for weight, summary in terms):
         return Welch(value, np.nan, np.nan, np.nan, np.nan, np.nan)
     parts = [(weight * summary.std) ** 2 / summary.n for weight, summary in terms]
     error = float(np.sqrt(sum(parts)))
@@ -119,11 +121,11 @@ def hedges_g(first: Summary, second: Summary, confidence: float = 0.95) -> Estim
     and has no interval.
     """
     degrees = first.n + second.n - 2
-    if first.n < 2 or second.n < 2:
+    if not all(one.n >= 2 and one.std < HUGE and abs(one.mean) < HUGE for one in (first, second)):
         return Estimate(np.nan, np.nan, np.nan, first.n + second.n)
     pooled = float(np.sqrt(((first.n - 1) * first.std**2 + (second.n - 1) * second.std**2) / degrees))
     difference = first.mean - second.mean
-    if pooled == 0:
+    if pooled <= 1e-12 * max(abs(first.mean), abs(second.mean)):  # equal values differ by as much in floating point
         g = 0.0 if difference == 0 else float(np.copysign(np.inf, difference))
         return Estimate(g, np.nan, np.nan, first.n + second.n)
     correction = 1 - 3 / (4 * degrees - 1)

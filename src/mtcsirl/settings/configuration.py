@@ -127,7 +127,9 @@ class MultiTaskSettings(Frozen):
     unseen_tasks: Tasks = key(UNSEEN_TASKS, "tasks of Table 2 and Figure 3; the paper names them in a missing figure")
 
     @model_validator(mode="after")
-    def _really_unseen(self) -> "MultiTaskSettings":
+    def _several_and_unseen(self) -> "MultiTaskSettings":
+        if len(self.train_tasks) == 1:
+            raise ValueError(f"train_tasks holds {self.train_tasks[0]} alone, as single_target can; name two or more")
         both = set(self.train_tasks) & set(self.unseen_tasks)
         if both:
             raise ValueError(f"unseen_tasks also in train_tasks: {', '.join(sorted(both))}; take it out of one list")

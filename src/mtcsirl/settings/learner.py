@@ -11,6 +11,8 @@ from mtcsirl.settings.base import Frozen, key
 Positive = Annotated[float, Field(gt=0)]
 Sizes = Annotated[tuple[Annotated[int, Field(gt=0)], ...], Field(min_length=1)]
 """Units of each hidden layer."""
+MOST_UPDATES = 1000
+"""Gradient steps per environment step at most: REDQ, known for many, takes 20, and with far more no run ends."""
 Temperature = Literal["automatic"] | Positive
 
 
@@ -50,7 +52,7 @@ class LearnerSettings(Frozen):
     min_log_std: float = key(-20.0, "lower clamp of the policy's log standard deviation", paper=-20.0)
     max_log_std: float = key(2.0, "upper clamp of the policy's log standard deviation", paper=2.0)
     minibatch: int = key(64, "transitions per gradient step", unit="transitions", paper=500, gt=0)
-    updates_per_step: float = key(0.5, "gradient steps per environment step", paper=1.0, gt=0)
+    updates_per_step: float = key(0.5, "gradient steps per environment step", paper=1.0, gt=0, le=MOST_UPDATES)
     random_steps: int = key(1000, "uniform random actions before the policy acts", unit="environment steps", ge=0)
     learner: Literal["fused", "stable_baselines3"] = key(
         "fused", "fused = this package's engine; stable_baselines3 = the reference"

@@ -1,7 +1,7 @@
 """From YAML files and single overrides to validated settings; every mistake becomes one line."""
 
 import difflib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from functools import reduce
 from pathlib import Path
 from typing import Any, TypeVar
@@ -68,8 +68,8 @@ def merge(base: Mapping[str, Any], overlay: Mapping[str, Any]) -> dict[str, Any]
 
 
 def override(data: Mapping[str, Any], assignments: Iterable[str]) -> dict[str, Any]:
-    """``data`` with assignments such as ``sac.minibatch=64`` on top; values are read as YAML."""
-    merged = dict(data)
+    """``data`` with assignments such as ``sac.minibatch=64`` on top; values are read as YAML, no key stands twice."""
+    merged, assigned = dict(data), set[str]()
     for assignment in assignments:
         name, equals, text = assignment.partition("=")
         if not equals or not name.strip():
@@ -80,8 +80,21 @@ def override(data: Mapping[str, Any], assignments: Iterable[str]) -> dict[str, A
             raise UserError(f"--set {name.strip()}: {error}") from error
         for part in reversed(name.strip().split(".")):
             value = {part: value}
+        for key in _keys(value):
+            if any(key == other or f"{key}.".startswith(f"{other}.") for other in assigned):
+                raise UserError(f"--set {key}: given twice; keep one")
+        assigned.update(_keys(value))
         merged = merge(merged, value)
     return merged
+
+
+def _keys(data: Any, name: str = "") -> Iterator[str]:
+    """The dotted names of all values in nested mappings."""
+    if not isinstance(data, Mapping):
+        yield name
+        return
+    for part, value in data.items():
+        yield from _keys(value, f"{name}.{part}" if name else str(part))
 
 
 def validate(model: type[Model], data: Mapping[str, Any], sources: Sources = ()) -> Model:

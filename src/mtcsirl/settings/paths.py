@@ -11,7 +11,11 @@ WILD = re.compile(r"[{}<>\x00-\x1f\x7f]")
 """What Snakemake takes for a wildcard or a variable, and control characters."""
 
 _CHECKOUT = Path(__file__).resolve().parents[3]
-_SOURCE = ("src", "tests", "workflow", "config", "profiles", ".git", ".github")
+_SOURCE = ("src", "tests", "workflow", "config", "profiles", "benchmarks", "containers", "docs", "examples", "website")
+_BUILT = ("audit", "constraints", "imitation", "sbx", "site")
+"""What make builds below build/, some of it in a folder that is emptied first."""
+_PART = ("part-0001", "manifest.json")
+"""The first part of an evidence archive, and what names it one."""
 
 
 def _literal(path: str) -> str:
@@ -42,11 +46,21 @@ def _to_be_filled(path: str) -> str:
         raise ValueError(f"{'it' if there == place else there} is {what}; name a folder")
     if place == place.parent:
         raise ValueError("the root of all folders; name one for the study alone")
-    if (_CHECKOUT / "Snakefile").is_file() and place.is_relative_to(_CHECKOUT):
-        inside = place.relative_to(_CHECKOUT).parts
-        if not inside or inside[0] in _SOURCE:
-            raise ValueError("a folder of this suite's own source; name another, for example results")
+    archive = next((one for one in (place, *place.parents) if os.path.isfile(one.joinpath(*_PART))), None)
+    if archive is not None:
+        raise ValueError(f"{'it' if archive == place else archive} holds an archive of runs; name a folder beside it")
+    for one in (place, Path(os.path.abspath(path))):  # .venv may be a link to elsewhere
+        if (_CHECKOUT / "Snakefile").is_file() and one.is_relative_to(_CHECKOUT):
+            _check_inside(one.relative_to(_CHECKOUT).parts)
     return path
+
+
+def _check_inside(parts: tuple[str, ...]) -> None:
+    """Raise ValueError where the folder of these ``parts`` below the checkout is not free for a study."""
+    if not parts or parts[0] in _SOURCE or parts[0].startswith("."):
+        raise ValueError("a folder of this suite's own source; name another, for example results")
+    if parts[0] == "build" and (len(parts) == 1 or parts[1] in _BUILT):
+        raise ValueError("make builds there and may empty it; name another, for example build/check")
 
 
 Folder = Annotated[

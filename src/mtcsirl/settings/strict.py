@@ -6,13 +6,13 @@ stand for a gigabyte. All of these are refused here, with the line they stand in
 
 import json
 import re
-from collections.abc import Hashable
 from typing import Any
 
 import yaml
 
 LONGEST, DEEPEST, MOST = 1 << 20, 20, 20_000
 """Characters of a text, nesting of its mappings and lists, and values in it with every alias written out."""
+MERGE = "tag:yaml.org,2002:merge"
 OCTAL = re.compile(r"[-+]?0[0-7_]+$")
 SEXAGESIMAL = re.compile(r"[-+]?\d[\d_]*(:[0-5]?\d)+(\.\d*)?$")
 
@@ -100,6 +100,7 @@ class _Loader(yaml.SafeLoader):
         if alias:
             return node
         if isinstance(node, yaml.MappingNode):
+            _check_keys(node)
             parts: list[yaml.Node] = [part for pair in node.value for part in pair]
         else:
             parts = list(node.value) if isinstance(node, yaml.SequenceNode) else []
@@ -108,16 +109,6 @@ class _Loader(yaml.SafeLoader):
             raise StrictError(f"more than {MOST:,} values once its aliases are written out{_place(node)}")
         self._sizes[id(node)] = size
         return node
-
-    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Hashable, Any]:
-        """A mapping none of whose keys stands twice."""
-        seen: set[str] = set()
-        for name, _ in node.value:
-            if isinstance(name, yaml.ScalarNode) and name.tag != "tag:yaml.org,2002:merge":
-                if name.value in seen:
-                    raise StrictError(f"the key {name.value!r} stands twice in one mapping{_place(name)}; keep one")
-                seen.add(name.value)
-        return super().construct_mapping(node, deep)
 
     def number(self, node: yaml.ScalarNode) -> int | float:
         """A number that YAML 1.1 and its reader take for the same one."""
@@ -134,6 +125,17 @@ class _Loader(yaml.SafeLoader):
 
 for _kind in ("int", "float"):
     _Loader.add_constructor(f"tag:yaml.org,2002:{_kind}", _Loader.number)
+
+
+def _check_keys(mapping: yaml.MappingNode) -> None:
+    """Raise StrictError where a key stands twice; before merges (``<<``) are resolved, which would hide it."""
+    seen: set[str] = set()
+    for name, _ in mapping.value:
+        if isinstance(name, yaml.ScalarNode):
+            if name.value in seen:
+                way_out = "merge a list, <<: [*one, *two]" if name.tag == MERGE else "keep one"
+                raise StrictError(f"the key {name.value!r} stands twice in one mapping{_place(name)}; {way_out}")
+            seen.add(name.value)
 
 
 def _place(where: Any) -> str:

@@ -6,6 +6,7 @@ Artefacts lie side by side in a few folders, so the record of each stands in a f
 
 import os
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
@@ -27,7 +28,7 @@ from mtcsirl.study.ablations import ABLATIONS
 from mtcsirl.study.code import artefact_code
 from mtcsirl.study.design import ARTEFACTS, CLAIMS, design
 from mtcsirl.study.keys import identity_of
-from mtcsirl.study.standing import DONE, STALE, Standing, of_folder
+from mtcsirl.study.standing import DONE, INCOMPLETE, STALE, Standing, of_folder
 from mtcsirl.worlds.drawable import lacking
 
 PLACES = {"results", "figures", "extensions"}
@@ -84,13 +85,15 @@ def not_rendered(name: str, settings: Settings) -> str | None:
 
 
 def _is_there(drawn: Identity, settings: Settings) -> bool:
-    """A picture that another machine drew stays."""
+    """A picture that another machine drew stays, unless it is damaged."""
     folder = record_folder(drawn.stage, settings.results)
     try:
         record = read_record(folder)
     except UserError:
         return False
-    return record is not None and record.identity.hash == drawn.hash and not lost(folder, record)
+    if record is None or record.identity.hash != drawn.hash:
+        return False
+    return not lost(folder, record) and not altered(folder, record)
 
 
 def record_folder(name: str, results: Path | str) -> Path:
@@ -99,21 +102,33 @@ def record_folder(name: str, results: Path | str) -> Path:
 
 
 def artefact_standing(name: str, settings: Settings) -> Standing:
-    """As :func:`mtcsirl.study.standing.standing`, of an artefact."""
-    found = of_folder(record_folder(name, settings.results), lambda: artefact_identity(name, settings))
+    """As :func:`mtcsirl.study.standing.standing`, of an artefact, whose few files are held against their checksums."""
+    folder = record_folder(name, settings.results)
+    found = of_folder(folder, lambda: artefact_identity(name, settings))
     record = found.record
-    if found.state == DONE and record is not None and dict(record.read) != read_bytes(record.read, settings.results):
+    if found.state != DONE or record is None:
+        return found
+    if changed := altered(folder, record):
+        return Standing(INCOMPLETE, tuple(changed), record)
+    if dict(record.read) != read_bytes(record.read, settings.results):
         return Standing(STALE, ("a run that it shows was made again with other bytes",), record)
     return found
 
 
+def altered(folder: Path, record: Record) -> list[str]:
+    """Which files of a record have other bytes than were signed, each in words."""
+    there = [(folder / name, wanted) for name, wanted in record.files.items() if (folder / name).is_file()]
+    return [f"{path.name} changed since it was written" for path, wanted in there if checksum(path) != wanted]
+
+
 def read_bytes(folders: Iterable[str], results: Path | str) -> dict[str, str]:
-    """The digest of the bytes of runs by their folder, of those that are there."""
+    """The digest of the bytes of runs by their folder, of those that are there and have a readable record."""
     found = {}
     for folder in folders:
-        record = read_record(Path(results) / folder)
-        if record is not None:
-            found[folder] = record.bytes
+        with suppress(UserError):
+            record = read_record(Path(results) / folder)
+            if record is not None:
+                found[folder] = record.bytes
     return found
 
 

@@ -18,6 +18,8 @@ BEGUN = ".begun"
 """Which run is being made here; goes when the run is signed."""
 _OURS = re.compile(r"\.begun|\.lock|\.[0-9a-f]{16}\.made|\..+\.tmp|\.nfs.*|\.snakemake.*|checkpoint.*|.*\.log|events")
 """What a run may have in its folder beside its results."""
+_ALSO_OF_VERBS = {"curve.csv", "diagnostics.csv", "evaluation.csv"}
+"""Files of runs whose names `validate`, `diagnostics` and `evaluate` give to their own as well."""
 
 
 class Named(NamedTuple):
@@ -61,9 +63,17 @@ def check_folder(folder: Path, stage: str, key: Mapping[str, Any] | None = None)
         raise UserError(f"{folder}: holds {left[0]}, but no run that wrote it; name a new or an empty folder")
 
 
-def check_without_run(folder: Path, own: str) -> None:
-    """Raise UserError where ``folder`` holds files of a run other than one named ``own``."""
-    _refuse_others(folder, _names(folder), {own})
+def check_without_run(folder: Path) -> None:
+    """Find out before any work whether a verb that makes no run may write into ``folder``.
+
+    Raises:
+        UserError: a run stands there or was begun there, or in the folder above.
+    """
+    _refuse_others(folder, _names(folder), _ALSO_OF_VERBS)
+    above = folder.absolute().parent
+    found = [folder] if left_traces(folder) else [above] if next(_runs_in(above), None) else []
+    if found:
+        raise UserError(f"{folder}: a run stands or was begun in {found[0]}; choose a folder of its own")
 
 
 def holds_run(folder: Path) -> bool:

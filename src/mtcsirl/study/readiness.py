@@ -12,7 +12,6 @@ from pathlib import Path
 import psutil
 
 from mtcsirl.errors import UserError
-from mtcsirl.files.identity import FILE
 from mtcsirl.files.provenance import commit
 from mtcsirl.files.storage import check_writable
 from mtcsirl.settings import Settings
@@ -21,6 +20,7 @@ from mtcsirl.study.memory import BASE
 from mtcsirl.study.plan import plan
 from mtcsirl.study.rates import Rates
 from mtcsirl.study.runs import AnyRun, Runs
+from mtcsirl.study.standing import DONE, standing
 from mtcsirl.worlds.drawable import lacking
 
 OK, LACKS, FAILS = "ok", "lacks", "fails"
@@ -42,7 +42,7 @@ class Finding:
 
 def findings(study: Runs, settings: Settings, rates: Rates, cores: int) -> Iterator[Finding]:
     """Everything that is looked at, for a study on ``cores`` cores of this machine."""
-    left = [run for run in study if not (Path(settings.results) / run.folder / FILE).is_file()]
+    left = [run for run in study if standing(run, settings).state != DONE]
     yield python(sys.version_info[:3])
     yield memory(left, settings, rates, cores, psutil.virtual_memory().available / 2**20)
     yield disk(left, settings, rates, shutil.disk_usage(existing(Path(settings.results))).free / 2**30)

@@ -6,12 +6,14 @@ Plain data in, lines out; who hands over the events of a workflow and where the 
 import textwrap
 import time
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 WIDEST = 200
 """Characters of a line."""
+REASON = 90
+"""Characters of one reason among several."""
 LOG_LINES = 5
 """Of the log of a job that failed."""
 IN_FULL = 8
@@ -120,6 +122,12 @@ def short(line: str, most: int = WIDEST) -> str:
         return line
     head = (most - 5) * 2 // 3
     return f"{line[:head]} ... {line[len(line) - (most - 5 - head) :]}"
+
+
+def first_of(reasons: Sequence[str], shown: int = 3) -> str:
+    """The first reasons in few words each, and how many more there are."""
+    more = [f"and {len(reasons) - shown} more"] if len(reasons) > shown else []
+    return "; ".join([*(short(reason, REASON) for reason in reasons[:shown]), *more])
 
 
 def wrapped(text: str, most: int = WIDEST) -> list[str]:

@@ -2,14 +2,13 @@
 
 from collections import defaultdict
 from collections.abc import Iterable
-from pathlib import Path
 from statistics import quantiles
 from typing import NamedTuple
 
-from mtcsirl.files import storage
 from mtcsirl.settings import Settings
 from mtcsirl.study.plan import cost
 from mtcsirl.study.rates import Rates
+from mtcsirl.study.readings import provenance_of
 from mtcsirl.study.runs import AnyRun
 from mtcsirl.study.standing import DONE, standing
 
@@ -41,18 +40,19 @@ def spent(study: Iterable[AnyRun], settings: Settings, rates: Rates, cores: int 
     ``cores``: how many of them ran at once; where it was more than one, the plan's seconds are those of busy cores.
 
     Raises:
-        UserError: the provenance of a run is unreadable.
+        UserError: the provenance of a run is unreadable, or lacks what is asked for.
     """
     slowdown = rates.slowdown if cores > 1 else 1.0
     pairs: dict[tuple[str, str, str], list[tuple[float, float]]] = defaultdict(list)
     for run in study:
         if standing(run, settings).state != DONE:
             continue
-        said = storage.read_json(Path(settings.results) / run.folder / "provenance.json")
-        together = len(said["lockstep"]) or 1
-        made = LOCKSTEP if said["lockstep"] else ALONE
+        said = provenance_of(run, settings)
+        others = len(said.parts("lockstep"))
+        together, made = others or 1, LOCKSTEP if others else ALONE
         planned = slowdown * (cost(run, settings, rates, together).seconds - rates.start_up / together)
-        pairs[run.stage, made, said["machine"]["processor"]].append((planned, said["cost"]["cpu_seconds"]))
+        measured = said.number("cost", "cpu_seconds")
+        pairs[run.stage, made, said.text("machine", "processor")].append((planned, measured))
     return [_of(*key, own) for key, own in pairs.items()]
 
 

@@ -59,6 +59,12 @@ def _over_its_inputs(run: Run[Any], record: Record, results: Path) -> Standing:
     return Standing(DONE, (), record)
 
 
+def own_reasons(why: Iterable[str]) -> list[str]:
+    """Of the reasons why something is stale those of its own: an input is another only because its run is."""
+    reasons = list(why)
+    return [reason for reason in reasons if not reason.startswith("input ")] or reasons
+
+
 def settle(runs: Iterable[Run[Any]], settings: Settings, *, mark: bool = True) -> dict[str, str]:
     """Leave in every folder the marker of what stands there; returns the hash that each run must have, by folder.
 

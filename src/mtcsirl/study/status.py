@@ -12,9 +12,10 @@ from mtcsirl.study.keys import identity_of
 from mtcsirl.study.outputs import OUTPUTS
 from mtcsirl.study.plan import cost
 from mtcsirl.study.rates import Rates
+from mtcsirl.study.readings import gate_of, provenance_of
 from mtcsirl.study.runs import AnyRun, Runs
-from mtcsirl.study.screen import last_said, short
-from mtcsirl.study.standing import DONE, INCOMPLETE, STALE, standing
+from mtcsirl.study.screen import first_of, last_said, short
+from mtcsirl.study.standing import DONE, INCOMPLETE, STALE, own_reasons, standing
 
 RUNNING, FAILED, WAITING = "running", "failed", "waiting"
 STATES = (DONE, STALE, RUNNING, FAILED, WAITING)
@@ -50,14 +51,14 @@ def run_status(run: AnyRun, settings: Settings) -> RunStatus:
         return RunStatus(run, RUNNING, says=last_said(log))
     found = standing(run, settings)
     if found.state == DONE:
-        return _finished(run, results / run.folder)
+        return _finished(run, settings)
     if found.state == INCOMPLETE:
         return RunStatus(run, FAILED, says="; ".join(found.why))
     if log.is_file():
         starting = time.time() - log.stat().st_mtime < STARTING_SECONDS
         if starting or log.stat().st_size:  # `snakemake --touch` leaves empty logs
             return RunStatus(run, RUNNING if starting else FAILED, says=last_said(log))
-    return RunStatus(run, STALE if found.state == STALE else WAITING, says="; ".join(found.why))
+    return RunStatus(run, STALE if found.state == STALE else WAITING, says=first_of(own_reasons(found.why)))
 
 
 def before_it_starts(study: Runs, settings: Settings) -> str:
@@ -65,12 +66,16 @@ def before_it_starts(study: Runs, settings: Settings) -> str:
     found = [standing(run, settings) for run in study]
     counts = Counter(one.state for one in found)
     said = [f"{counts[DONE]} done"] + [f"{counts[state]} {state}" for state in (STALE, INCOMPLETE) if counts[state]]
-    # what follows from another run's change is no reason of its own, unless it is the only one
-    reasons = [one.why for one in found if one.state == STALE]
-    own = [[why for why in whys if not why.startswith("input ")] or ["an input is another"] for whys in reasons]
-    top = Counter(short(why, 60) for whys in own for why in whys).most_common(TOP)
+    reasons = [why for one in found if one.state == STALE for why in _by_itself(one.why)]
+    top = Counter(short(why, 60) for why in reasons).most_common(TOP)
     because = f" ({'; '.join(f'{count} x {why}' for why, count in top)})" if top else ""
     return f"{settings.results}: of {len(found)} runs {', '.join(said)}{because}"
+
+
+def _by_itself(why: tuple[str, ...]) -> list[str]:
+    """The reasons of a stale run, of its inputs in few words and once."""
+    own = own_reasons(why)
+    return ["an input is another"] if own[:1] and own[0].startswith("input ") else own
 
 
 def seconds_left(statuses: list[RunStatus], settings: Settings, rates: Rates, cores: int) -> float:
@@ -90,10 +95,10 @@ def seconds_left(statuses: list[RunStatus], settings: Settings, rates: Rates, co
     return sum(pace[stage] * seconds for stage, seconds in left.items()) / cores
 
 
-def _finished(run: AnyRun, folder: Path) -> RunStatus:
+def _finished(run: AnyRun, settings: Settings) -> RunStatus:
     try:
-        seconds = float(storage.read_json(folder / "provenance.json")["cost"]["cpu_seconds"])
-        gate = storage.read_json(folder / "gate.json") if "gate.json" in OUTPUTS[run.stage] else {}
-        return RunStatus(run, DONE, gate.get("passed"), seconds)
-    except (UserError, KeyError, TypeError, ValueError, AttributeError) as error:
+        seconds = provenance_of(run, settings).number("cost", "cpu_seconds")
+        passed = gate_of(run, settings).flag("passed") if "gate.json" in OUTPUTS[run.stage] else None
+        return RunStatus(run, DONE, passed, seconds)
+    except UserError as error:
         return RunStatus(run, FAILED, says=str(error))

@@ -1,5 +1,6 @@
 """Is every file of a results folder what its run wrote? `mtcsirl verify` says what to delete."""
 
+import os
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -30,10 +31,11 @@ def faults(results: Path) -> Iterator[Fault]:
     """
     if not results.is_dir():
         raise UserError(f"{results}: no such folder")
-    signed = {path.parent for path in results.rglob(FILE) if _is_ours(path.parent)}
-    begun = {path.parent for path in results.rglob("settings.json") if not _apart(path, results)} - signed
+    there = list(_files(results))
+    signed = {path.parent for path in there if path.name == FILE and _is_ours(path.parent)}
+    begun = {path.parent for path in there if path.name == "settings.json" and not _apart(path, results)} - signed
     unsigned = {folder for folder in begun if holds_run(folder)}
-    left = sorted(path for path in results.rglob(".*.tmp") if _TEMPORARY.fullmatch(path.name))
+    left = sorted(path for path in there if _TEMPORARY.fullmatch(path.name))
     if not (signed or unsigned or left):
         raise UserError(f"{results}: holds no run; name the results folder of a study, or of one run")
     for folder in sorted(signed):
@@ -42,6 +44,18 @@ def faults(results: Path) -> Iterator[Fault]:
         yield Fault(folder, f"holds results without {FILE}: its run never ended, or they come from elsewhere")
     for path in left:
         yield Fault(path, "left by a writer that was killed")
+
+
+def _files(results: Path) -> Iterator[Path]:
+    """Every file below ``results``, in linked folders too; what several links lead to once, so that circles end."""
+    seen: set[str] = set()
+    for folder, below, names in os.walk(results, followlinks=True):
+        real = os.path.realpath(folder)
+        if real in seen:
+            below.clear()
+            continue
+        seen.add(real)
+        yield from (Path(folder, name) for name in names)
 
 
 def _is_ours(folder: Path) -> bool:

@@ -2,7 +2,7 @@
 
 import pandas as pd
 
-from mtcsirl.names import EVALUATION_TARGET
+from mtcsirl.names import EVALUATION_TARGET, agent_label
 from mtcsirl.results.notes import left_out, remarks
 from mtcsirl.results.published import RATIO_TABLES, Published
 from mtcsirl.results.rows import select
@@ -13,6 +13,8 @@ from mtcsirl.tables.entries import Entry, Layout, Quantity, Row, result_table
 from mtcsirl.tables.table import Table
 
 BASELINE = "SAC (task reward alone)"
+PAPERS = "mt_csirl"
+"""The method of the paper's numbers."""
 REMARK = "The paper prints no spread for this table, so there is no prediction interval to fall inside."
 
 
@@ -69,13 +71,15 @@ def cross_transfer_table(
 def _caption(cs_reward: str, target: float, settings: Settings) -> str:
     quantity = _words(cs_reward)
     seen = settings.multi_target.train_targets
+    method, papers = agent_label(settings.multi_target.method), agent_label(PAPERS)
+    whose = "" if method == papers else f", that of {papers}"
     new = "which is among them" if EVALUATION_TARGET in seen else "not among them"
     return (
         f"{quantity.capitalize()} cs-reward, several targets: {quantity} of a new agent divided by its target "
-        f"({target:g}); closer to 1 is better. Rows: the task on whose {_targets(seen)} MT-CSIRL learned the "
+        f"({target:g}); closer to 1 is better. Rows: the task on whose {_targets(seen)} {method} learned the "
         "reward; "
         f"columns: the task on whose target {EVALUATION_TARGET}, {new}, a new agent was trained and evaluated. "
-        f"Mean±std over n = {len(settings.seeds)} seeds where no other n is printed, and the paper's mean."
+        f"Mean±std over n = {len(settings.seeds)} seeds where no other n is printed, and the paper's mean{whose}."
     )
 
 
