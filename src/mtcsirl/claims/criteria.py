@@ -252,10 +252,8 @@ def _as_the_text_says(ours: Group, theirs: Group, sac: Group, home: str, rules: 
     part = rules["needs_diagonal"]
     if closing(ours.distance, sac.distance, part)[0] == NOT_MET:
         yield NOT_MET, f"transfers itself (closes {100 * part:g} % of SAC's gap)"
-    if (
-        worst([closing(theirs.distance, sac.distance, part), at_least(theirs.sure_success, rules["success"], "")])
-        == MET
-    ):
+    other = closing(theirs.distance, sac.distance, part), at_least(theirs.sure_success, rules["success"], "")
+    if worst(other) == MET:
         yield NOT_MET, f"{home}'s reward does not transfer"
 
 

@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from mtcsirl.claims.gates import failed, needed
 from mtcsirl.names import EVALUATION_TARGET, LAST, distance_metric
 from mtcsirl.results.published import Published
-from mtcsirl.results.rows import KEY, MISSING, OK, STALE, select
+from mtcsirl.results.rows import KEY, OK, select
 from mtcsirl.results.statistics import Summary, probability_of_improvement, summarise
 from mtcsirl.rewards.ground_truth import COMMON_SENSE_REWARDS
 from mtcsirl.settings import Settings
@@ -162,8 +163,8 @@ class Evidence:
 
         def of(agents: pd.DataFrame, places: Mapping[Any, Any], last: Group | None) -> Group:
             found = {task: places.get((*names, task, target), nothing) for task in tasks}
-            frames = {task: agents.iloc[place].set_index("seed") for task, place in found.items()}
-            frames = {task: frame[frame.index.isin(list(seeds))] for task, frame in frames.items()}
+            own = {task: agents.iloc[place] for task, place in found.items()}
+            frames = {task: rows[rows["seed"].isin(list(seeds))].set_index("seed") for task, rows in own.items()}
             return Group(key["stage"], frames, cs_reward, goal, self.settings.evaluation.episodes, last)
 
         tasks = tuple(tasks)
@@ -214,12 +215,11 @@ class Evidence:
             found = select(self._agents, **keys[name])
             each = [found["task"], found["target"], found["seed"]]
             passed = int((found["status"] == OK).groupby(each).all().sum())
-            failed = int((~found["status"].isin([OK, MISSING, STALE])).groupby(each).any().sum())
+            lost = int(failed(found["status"]).groupby(each).any().sum())
             count = len(source.tasks) * len(source.targets) * len(set(seeds[name]))
-            needed = int(share * count + 0.5)
-            if passed < needed:
-                unknown = f", {count - passed - failed} missing" if count > passed + failed else ""
-                return f"{passed} of {count} {name} passed their gate{unknown}", count - failed < needed
+            if passed < needed(share, count):
+                unknown = f", {count - passed - lost} missing" if count > passed + lost else ""
+                return f"{passed} of {count} {name} passed their gate{unknown}", count - lost < needed(share, count)
         return "", False
 
     def scored(self, source: "RewardSource", task: str) -> pd.DataFrame:

@@ -5,6 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from mtcsirl.claims.evidence import Evidence, Group, RewardSource
+from mtcsirl.claims.gates import failed, needed
 from mtcsirl.claims.judging import (
     BLOCKED,
     JUDGED,
@@ -18,7 +19,6 @@ from mtcsirl.claims.judging import (
     at_least,
     closing,
 )
-from mtcsirl.results.rows import MISSING, OK, STALE
 
 CONDITIONAL = "conditional on the experts: all IRL seeds imitate those of the first seed"
 
@@ -83,11 +83,10 @@ def failing(agents: Group, name: str, seeds: Collection[int], success: float, sh
     Of those that the study asks for, each task by ``seeds``, the whole number nearest to ``share`` of them has to pass
     its gate; those that are missing may yet. Nor may their success be surely below the gate's.
     """
-    states = [state for frame in agents.agents.values() for state in frame["status"]]
     count = len(agents.agents) * len(set(seeds))
-    failed = sum(state not in (OK, MISSING, STALE) for state in states)
-    if count - failed < int(share * count + 0.5):
-        return f"{failed} of {count} {name} failed their gate"
+    lost = sum(int(failed(frame["status"]).sum()) for frame in agents.agents.values())
+    if count - lost < needed(share, count):
+        return f"{lost} of {count} {name} failed their gate"
     if at_least(agents.sure_success, success, "")[0] == NOT_MET:
         return f"{name} surely succeed in less than {100 * success:g} % of their episodes"
     return ""
