@@ -46,9 +46,9 @@ reference: setup  ## from the committed archive, without training: every table, 
 	    || { echo "make reference: git names nothing committed to compare with; clone the repository with git" >&2; exit 1; }
 	@gone=$$(git ls-files --deleted results/reference paper_figs docs/results.md) && [ -z "$$gone" ] \
 	    || { echo "make reference: lost:" $$gone "(git checkout brings it back)" >&2; exit 1; }
-	mtcsirl archive verify --archive $(ARCHIVE) --runs $(RUNS)
 	rm -rf $(REFERENCE)
-	mtcsirl archive unpack --archive $(ARCHIVE) $(WITHIN)
+	printf '%s\n' 'verify --runs $(RUNS)' 'unpack $(WITHIN)' \
+	    | xargs -P $(CORES) -I '{}' sh -c 'mtcsirl archive {} --archive $(ARCHIVE)'
 	{ echo "results --output $(REFERENCE)/docs"; printf '%s\n' $(SHOWN) | tr - ' '; } \
 	    | xargs -P $(CORES) -I '{}' sh -c 'mtcsirl {} --partial $(WITHIN) > /dev/null'
 	mtcsirl report --partial $(WITHIN)

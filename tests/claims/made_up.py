@@ -64,11 +64,13 @@ def scored(settings=SETTINGS):
     """The key of every reward that is scored, by IRL seed and evaluation task."""
     for cs in settings.cs_rewards:
         for seed in settings.irl_seeds:
-            own = {"method": "mt_csirl", "cs_reward": cs, "seed": seed}
+            own = {"cs_reward": cs, "seed": seed}
+            single = own | {"experiment": "single_target", "method": settings.single_target.method}
             for task in settings.single_target.tasks:
-                yield own | {"experiment": "single_target", "source": task, "task": task}
+                yield single | {"source": task, "task": task}
+            several = own | {"experiment": "multi_task", "method": "mt_csirl", "source": "all"}
             for task in settings.multi_task.unseen_tasks:
-                yield own | {"experiment": "multi_task", "source": "all", "task": task}
+                yield several | {"task": task}
 
 
 def scores(settings=SETTINGS):

@@ -3,6 +3,7 @@ import json
 import pytest
 
 from mtcsirl.claims.claims import VERDICTS, claims_json, combine, judge
+from mtcsirl.settings import Settings
 from tests.claims.made_up import (
     CLAIMS,
     SETTINGS,
@@ -225,6 +226,13 @@ def test_missing_runs_are_not_run_and_not_failures():
     assert verdict("C3", change=lambda rows: missing(rows, stage="train_sac")) == "not run"
     one_seed = {"stage": "transfer", "experiment": "multi_task", "method": "mt_csirl", "seed": 4}
     assert verdict("C7", change=lambda rows: missing(rows, **one_seed)) == "inconclusive"
+
+
+def test_claims_on_one_task_are_about_the_method_that_the_settings_name(findings):
+    said = {"single_target": {"method": "mt_vairl"}, "multi_target": {"method": "mt_airl"}}
+    study = SETTINGS.model_dump(mode="json")
+    settings = Settings.model_validate(study | {name: study[name] | own for name, own in said.items()})
+    assert verdicts(settings=settings) == {finding.name: finding.verdict for finding in findings}
 
 
 def test_the_curriculum_claim_needs_its_ablation():

@@ -1,5 +1,7 @@
 """States of discriminators from made-up diagnostics with known answers."""
 
+from pathlib import Path
+
 import pandas as pd
 import pytest
 
@@ -32,6 +34,10 @@ def _rows(late: float, discriminators: tuple[str, ...] = ("f",)) -> pd.DataFrame
 
 def _gate(passed: bool) -> dict[str, object]:
     return {"task": "reach", "target": 1, "metric": 0.7, "success": 1.0, "passed": passed}
+
+
+def _write_gate(folder: Path, members: list[dict[str, object]]) -> None:
+    storage.write_json(folder / "gate.json", {"passed": False, "success": 0.5, "metric": 0.7, "members": members})
 
 
 @pytest.mark.parametrize(
@@ -71,7 +77,7 @@ def test_one_iteration_without_a_number_is_no_state(metric) -> None:
 def test_what_lacks_a_generator_is_one_line(tmp_path) -> None:
     run = next(run for run in design(Settings()).irl_runs if run.source == "reach-wall")
     rows = _rows(1.0).assign(task=run.members[0][0])
-    storage.write_json(tmp_path / run.folder / "gate.json", {"members": [_gate(True) | {"task": run.members[0][0]}]})
+    _write_gate(tmp_path / run.folder, [_gate(True) | {"task": run.members[0][0]}])
     storage.write_csv(tmp_path / run.folder / "diagnostics.csv", rows)
     read_diagnoses([run], tmp_path)
     for broken in (rows.assign(task="push"), rows[rows["metric"] != "temperature"]):
@@ -80,8 +86,17 @@ def test_what_lacks_a_generator_is_one_line(tmp_path) -> None:
             read_diagnoses([run], tmp_path)
         assert "\n" not in str(error.value)
     storage.write_csv(tmp_path / run.folder / "diagnostics.csv", rows)
-    storage.write_json(tmp_path / run.folder / "gate.json", {"passed": True})
+    storage.write_json(tmp_path / run.folder / "gate.json", _gate(True))
     with pytest.raises(UserError, match="lacks 'members'"):
+        read_diagnoses([run], tmp_path)
+
+
+@pytest.mark.parametrize("said", [{"passed": "false"}, {"success": "1.0"}, {"metric": [0.7]}])
+def test_what_no_gate_says_is_refused(tmp_path, said) -> None:
+    run = next(run for run in design(Settings()).irl_runs if run.source == "reach-wall")
+    storage.write_csv(tmp_path / run.folder / "diagnostics.csv", _rows(1.0).assign(task=run.members[0][0]))
+    _write_gate(tmp_path / run.folder, [_gate(True) | {"task": run.members[0][0]} | said])
+    with pytest.raises(UserError, match="not the verdict of a gate"):
         read_diagnoses([run], tmp_path)
 
 
@@ -90,8 +105,7 @@ def test_the_runs_of_a_study_are_read_and_counted(tmp_path) -> None:
     with pytest.raises(UserError, match=r"diagnostics\.csv"):
         read_diagnoses([run], tmp_path)
     storage.write_csv(tmp_path / run.folder / "diagnostics.csv", _rows(1.0).assign(task=run.members[0][0]))
-    gate = _gate(False) | {"task": run.members[0][0]}
-    storage.write_json(tmp_path / run.folder / "gate.json", {"members": [gate]})
+    _write_gate(tmp_path / run.folder, [_gate(False) | {"task": run.members[0][0]}])
     text = diagnoses_markdown(read_diagnoses([run], tmp_path), ["a note"])
     assert f"- {run.experiment} mt_csirl {run.cs_reward}, f: 1 saturated" in text
     assert "0.70, success 1.0 *" in text

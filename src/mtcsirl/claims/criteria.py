@@ -52,7 +52,7 @@ def on_target(evidence: Evidence, rules: Rules) -> Iterator[Unit]:
             if rules["agent"] == "expert":
                 group, printed = evidence.experts(cs, [task]), paper.unseen("expert", cs, cs)
             elif rules["agent"] == "generator":
-                source = single_target(cs, task)
+                source = single_target(settings, cs, task)
                 group = evidence.generators(source)
             else:
                 source = multi_task(settings, cs, "mt_csirl_lt")
@@ -191,7 +191,7 @@ def suffers_without(evidence: Evidence, rules: Rules) -> Iterator[Unit]:
     """C12: generators trained without the curriculum succeed less often than those trained with it."""
     cs, needed = evidence.settings.ablations.cs_reward, rules["advantage"]
     for task in evidence.settings.ablations.tasks:
-        source, seeds = single_target(cs, task), evidence.settings.ablations.seeds
+        source, seeds = single_target(evidence.settings, cs, task), evidence.settings.ablations.seeds
         with_it = evidence.generators(source, seeds=seeds)
         without = evidence.generators(replace(source, experiment=rules["experiment"]), seeds=seeds)
         terms = (1.0, with_it.sure_success), (-1.0, without.sure_success)

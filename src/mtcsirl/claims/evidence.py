@@ -280,14 +280,16 @@ class RewardSource:
         return self.experiment == "multi_target"
 
 
-def single_target(cs_reward: str, task: str) -> RewardSource:
+def single_target(settings: Settings, cs_reward: str, task: str) -> RewardSource:
     """Section 5.1 on ``task``."""
-    return RewardSource("single_target", "mt_csirl", cs_reward, task, (task,), (EVALUATION_TARGET,))
+    method = settings.single_target.method
+    return RewardSource("single_target", method, cs_reward, task, (task,), (EVALUATION_TARGET,))
 
 
 def multi_target(settings: Settings, cs_reward: str, task: str) -> RewardSource:
     """Section 5.2 on ``task``."""
-    return RewardSource("multi_target", "mt_csirl", cs_reward, task, (task,), settings.multi_target.train_targets)
+    study = settings.multi_target
+    return RewardSource("multi_target", study.method, cs_reward, task, (task,), study.train_targets)
 
 
 def multi_task(settings: Settings, cs_reward: str, method: str) -> RewardSource:

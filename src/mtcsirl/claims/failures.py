@@ -44,7 +44,7 @@ def equivalent_to_sac(evidence: Evidence, rules: Rules) -> Iterator[Unit]:
     """C3: the new agent succeeds, and its metric equals plain SAC's within a part of the gap from SAC to the target."""
     for cs in in_paper_order(evidence.settings.cs_rewards):
         for task in tasks_of(evidence, rules["units"]):
-            source = single_target(cs, task)
+            source = single_target(evidence.settings, cs, task)
             group, sac = evidence.transfers(source, [task]), evidence.sac(cs, [task])
             margin = rules["margin"]
             near = nearness(group.metric, sac.metric, group.target, margin)

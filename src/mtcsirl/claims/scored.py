@@ -42,7 +42,7 @@ def correlation(evidence: Evidence, rules: Rules) -> Iterator[Unit]:
     for cs in in_paper_order(settings.cs_rewards):
         for task in tasks_of(evidence, rules["units"]):
             if rules["experiment"] == "single_target":
-                source = single_target(cs, task)
+                source = single_target(settings, cs, task)
             else:
                 source = multi_task(settings, cs, "mt_csirl")
             points, left_out = usable(evidence.scored(source, task))

@@ -5,6 +5,7 @@ from matplotlib.figure import Figure
 from mtcsirl.figures import single_target
 from mtcsirl.figures.data import FigureData
 from mtcsirl.figures.scatter import scatter_caption, scatter_figure
+from mtcsirl.names import agent_label
 
 TITLE = "Action norm: true and learned reward, single task"
 _CS_REWARD = "action_norm"
@@ -24,4 +25,5 @@ def caption(data: FigureData) -> str:
     """What the figure shows."""
     task = data.settings.single_target.tasks[0]
     found = single_target.correlation(data, task, _CS_REWARD)
-    return f"Reward learned from a single task and target, {task}. {scatter_caption(found, _CS_REWARD)}"
+    method = agent_label(data.settings.single_target.method)
+    return f"{method}'s reward, learned from a single task and target, {task}. {scatter_caption(found, _CS_REWARD)}"

@@ -18,7 +18,7 @@ from mtcsirl.figures.style import (
     scale_notes,
     styled,
 )
-from mtcsirl.names import EVALUATION_TARGET
+from mtcsirl.names import EVALUATION_TARGET, agent_label
 from mtcsirl.settings.runs import irl_run
 from mtcsirl.study.design import design
 
@@ -97,10 +97,11 @@ def caption(data: FigureData, artefact: str, task: str, metrics: list[str], *, s
     numbers = "; ".join(
         f"{quantity(metric)}: {counts(curve_series(data, artefact, task, metric))}" for metric in metrics
     )
+    method = agent_label(data.settings.single_target.method)
     text = (
-        f"Learned from {task} with one target and tried on the same. {letters}: the agent during IRL "
-        "(IRL agent), a new agent trained from scratch on r_task + the learned cs-reward (Transferred) and an agent "
-        "without any cs-reward (SAC), training episodes of the stochastic policy. Red line: target. "
+        f"{method}'s reward, learned from {task} with one target and tried on the same. {letters}: the agent during "
+        "IRL (IRL agent), a new agent trained from scratch on r_task + the learned cs-reward (Transferred) and an "
+        "agent without any cs-reward (SAC), training episodes of the stochastic policy. Red line: target. "
         f"Lines and bands: mean and 95 % t-interval over seeds ({numbers}); bands are cut off at the frame, "
         "curves end where the shortest run does. Success below the panels: of training episodes; tables have that of "
         "evaluation episodes."

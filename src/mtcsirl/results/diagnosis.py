@@ -22,6 +22,7 @@ from mtcsirl.errors import UserError
 from mtcsirl.files import storage
 from mtcsirl.names import DIAGNOSTIC_COLUMNS
 from mtcsirl.results.agents import run_key
+from mtcsirl.results.gate_file import read_verdict
 from mtcsirl.study.runs import IrlRun
 
 SATURATED, BLIND = 0.99, 0.55
@@ -44,7 +45,7 @@ def read_diagnoses(runs: Sequence[IrlRun], results: Path | str) -> pd.DataFrame:
     for run in runs:
         folder = Path(results) / run.folder
         rows = storage.read_csv(folder / "diagnostics.csv", DIAGNOSTIC_COLUMNS)
-        gate = storage.read_json(folder / "gate.json")
+        gate = read_verdict(folder / "gate.json")
         try:
             found = diagnose(rows, gate["members"])
         except (KeyError, TypeError) as error:
@@ -74,7 +75,7 @@ def diagnose(diagnostics: pd.DataFrame, gates: Sequence[Mapping[str, Any]]) -> p
             own = {metric: float(member.at[name, metric]) for metric in OF_DISCRIMINATOR}
             known = all(map(math.isfinite, own.values()))
             accuracy = (own["accuracy_expert"] + own["accuracy_generator"]) / 2 if known else math.nan
-            rows.append(judged | own | {"discriminator": name, "state": state(accuracy, bool(gate["passed"]))})
+            rows.append(judged | own | {"discriminator": name, "state": state(accuracy, gate["passed"])})
     return pd.DataFrame(rows)
 
 

@@ -16,10 +16,9 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from mtcsirl.results.correlation import NOTHING_LEFT
+from mtcsirl.results.points import POLICIES
 from mtcsirl.results.statistics import Array, Estimate
 
-POLICIES = ("sac", "expert", "generator", "uniform")
-"""The sets of transitions that are the equal parts of ``across``."""
 SHARED = ("sac", "expert")
 """Sets whose agents are the same in every IRL run: drawn once for all of them."""
 Counts = NDArray[np.int64]

@@ -7,8 +7,9 @@ import numpy as np
 import pandas as pd
 
 from mtcsirl.files import storage
-from mtcsirl.results.moments import POLICIES
 
+POLICIES = ("sac", "expert", "generator", "uniform")
+"""The sets of transitions that are the equal parts of ``across``."""
 EPISODE = ["transitions", "agent", "episode"]
 REWARDS = ["learned", "truth", "task_reward"]
 

@@ -13,11 +13,12 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
-from mtcsirl.errors import MissingError, UserError
+from mtcsirl.errors import MissingError
 from mtcsirl.files import storage
 from mtcsirl.names import CS_REWARDS, DIVERGED, KEPT, LAST, distance_metric
 from mtcsirl.results.agents import agents, run_key
 from mtcsirl.results.completeness import POLICIES, what_lacks
+from mtcsirl.results.gate_file import read_verdict
 from mtcsirl.results.points import read_points
 from mtcsirl.settings import Settings
 from mtcsirl.study import standing as standings
@@ -211,7 +212,7 @@ def _demonstration_rows(run: Demonstrations, folder: Path, status: str, why: str
     """Success and metric of one expert's demonstrations."""
     verdict: dict[str, Any] = {}
     if not status:
-        verdict = _verdict(folder / "gate.json")
+        verdict = read_verdict(folder / "gate.json")
         status = OK if verdict["passed"] else BELOW_GATE
     key = run_key(run) | {"task": run.task, "target": run.target, "seed": run.expert.seed}
     marks = {"policy": "stochastic", "kept": KEPT, "status": status, "lacks": why, "folder": str(folder)}
@@ -245,25 +246,10 @@ def _passed(gate: Path, agent: dict[str, Any]) -> bool:
     Raises:
         UserError: the file is no gate's.
     """
-    verdict = _verdict(gate)
+    verdict = read_verdict(gate)
     member = agent["task"], agent["target"]
     own = [one for one in verdict.get("members", []) if (one.get("task"), one.get("target")) == member]
     return bool((own or [verdict])[-1]["passed"])
-
-
-def _verdict(gate: Path) -> dict[str, Any]:
-    verdict: dict[str, Any] = storage.read_json(gate)
-    members = verdict.get("members", []) if isinstance(verdict, dict) else None
-    if not isinstance(members, list) or not all(_is_verdict(one) for one in (verdict, *members)):
-        raise UserError(f"{gate}: not the verdict of a gate; delete it and make its run again")
-    return verdict
-
-
-def _is_verdict(said: Any) -> bool:
-    """Whether ``said`` is what a gate says of an agent; any text as ``passed`` would count as yes."""
-    kinds: dict[str, Any] = {"passed": bool, "success": float | int | None, "metric": float | int | None}
-    fits = isinstance(said, dict) and all(name in said and isinstance(said[name], kinds[name]) for name in kinds)
-    return fits and isinstance(said.get("diverged", 0), int)
 
 
 def _mark_equal_seeds(rows: pd.DataFrame) -> pd.DataFrame:
