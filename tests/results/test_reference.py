@@ -83,4 +83,4 @@ def test_make_reference_names_what_is_committed_and_lost(tmp_path, lost):
 def test_make_reference_asks_for_the_runs_that_the_readme_counts():
     words = ["make", "--dry-run", "--old-file=setup", "reference"]
     said = subprocess.run(words, cwd=CHECKOUT, capture_output=True, text=True, check=True).stdout
-    assert f"--runs {len(archived(REFERENCE))}\n" in said
+    assert f"verify --runs {len(archived(REFERENCE))}'" in said
