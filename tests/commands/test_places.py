@@ -91,6 +91,23 @@ def test_neither_a_folder_below_a_run_nor_one_that_is_home_there(
     assert contents(here) == before
 
 
+@pytest.mark.parametrize("place", ["run/s0.png", "run/policies/s0.png"])
+def test_no_single_file_joins_a_run(place: str, here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    begun(here / "run")
+    before = contents(here)
+    assert cli.main(["draw-diagnostics", "--run", "run", "--output", place]) == 2
+    assert capsys.readouterr().err.endswith(f"{place}: a run's folder; choose a place outside of it\n")
+    assert contents(here) == before
+    assert cli.main(["draw-diagnostics", "--run", "run", "--output", "s0.png"]) == 2
+    assert "s0.png" not in capsys.readouterr().err, "it is the run that is no good"
+
+
+def test_a_single_file_replaces_none_that_is_named_as_a_runs(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    finished(here / "copy")
+    assert cli.main(["draw-diagnostics", "--run", "copy", "--output", "copy/reward.json"]) == 2
+    assert "copy/reward.json: a run's folder" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize("stage", OUTPUTS)
 def test_a_run_of_any_stage_is_known_by_its_files(stage: str, here: Path) -> None:
     finished(here / "run", stage)

@@ -19,7 +19,7 @@ from mtcsirl.settings.machine import check_run
 from mtcsirl.settings.unread import refuse, unread
 from mtcsirl.study.ablations import ABLATIONS
 from mtcsirl.study.design import ARTEFACTS
-from mtcsirl.study.folders import check_folder
+from mtcsirl.study.folders import check_folder, check_outside_runs
 
 Model = TypeVar("Model", bound=BaseModel)
 Verbs = Any
@@ -169,8 +169,10 @@ def new_folder(text: str) -> Path:
 
 
 def new_file(text: str) -> Path:
-    """A file that can be written."""
-    return _writable(text, folder=False)
+    """A file that can be written, in no run's folder."""
+    file = _writable(text, folder=False)
+    check_outside_runs(file)
+    return file
 
 
 def _writable(text: str, *, folder: bool) -> Path:

@@ -76,6 +76,18 @@ def check_without_run(folder: Path) -> None:
         raise UserError(f"{folder}: a run stands or was begun in {found[0]}; choose a folder of its own")
 
 
+def check_outside_runs(file: Path) -> None:
+    """Find out before any work whether a verb may write this one ``file``: it would replace a run's own, or join them.
+
+    Raises:
+        UserError: a run stands or was begun in its folder, or stands in the folder above.
+    """
+    folder = file.absolute().parent
+    replaced = file.is_file() and any(file.name in outputs for outputs in OUTPUTS.values())
+    if replaced or holds_run(folder) or next(_runs_in(folder.parent), None):
+        raise UserError(f"{file}: a run's folder; choose a place outside of it")
+
+
 def holds_run(folder: Path) -> bool:
     """Whether a run stands in ``folder`` or was begun there, of this version or an older one."""
     return left_traces(folder) or any((folder / name).is_file() for name in (FILE, "provenance.json"))
