@@ -1,10 +1,12 @@
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
+from matplotlib.text import Text
 
 from mtcsirl.figures import heat_maps as heatmaps
 from mtcsirl.figures.heat_maps import heat_map, heat_map_caption, heat_map_matrices
 from mtcsirl.results.published import load_published
+from mtcsirl.results.rows import BELOW_GATE
 from mtcsirl.settings import Settings
 from mtcsirl.study.design import design
 from tests.results.made_up import evaluation
@@ -26,7 +28,7 @@ def rows(cs_reward):
 def test_both_panels_share_one_scale_that_holds_every_value(cs_reward):
     """Ours overshoots the target threefold on the diagonal (velocity): the scale stretches for both panels."""
     frame = rows(cs_reward)
-    paper, ours, _ = heat_map_matrices(cs_reward, frame, SETTINGS, load_published())
+    paper, ours, _, _ = heat_map_matrices(cs_reward, frame, SETTINGS, load_published())
     figure = heat_map(cs_reward, frame, SETTINGS)
     assert isinstance(figure, Figure)
     images = [image for axes in figure.axes for image in axes.get_images()]
@@ -44,12 +46,24 @@ def test_incomplete_cells_are_starred_and_missing_ones_empty():
     frame = rows("velocity")
     frame.loc[(frame["source"] == "push-back") & (frame["seed"] == 1), "value"] = np.nan
     frame.loc[(frame["source"] == "drawer-close") & (frame["task"] == "reach-wall"), "value"] = np.nan
-    _, ours, incomplete = heat_map_matrices("velocity", frame, SETTINGS, load_published())
+    _, ours, incomplete, _ = heat_map_matrices("velocity", frame, SETTINGS, load_published())
     assert incomplete.sum() == 4
     assert np.isnan(ours).sum() == 1
     texts = [text.get_text() for text in heat_map("velocity", frame, SETTINGS).axes[1].texts]
     assert len(texts) == 11
     assert sum(text.endswith("*") for text in texts) == 3
+
+
+def test_cells_whose_agents_lost_their_task_say_how_many():
+    """A cell on target would be taken for a reward that serves."""
+    frame = rows("velocity")
+    lost = (frame["stage"] == "transfer") & (frame["source"] == "push-back") & (frame["task"] == "reach-wall")
+    figure = heat_map("velocity", frame.assign(status=frame["status"].mask(lost, BELOW_GATE)), SETTINGS)
+    marked = [text.get_text() for text in figure.axes[1].texts if "†" in text.get_text()]
+    assert len(marked) == 1
+    assert marked[0].endswith("\n†2")
+    assert any("below their gate" in text.get_text() for text in figure.texts)
+    assert not any("†" in text.get_text() for text in heat_map("velocity", frame, SETTINGS).findobj(Text))
 
 
 def test_nothing_there_yet_still_shows_the_paper():

@@ -28,41 +28,47 @@ SHORT = {"button-press-topdown-wall": "BP-topdown-wall"}
 CAPTION = (
     "{quantity} of new agents divided by its target: the paper's Table {number} (left) and ours (right) on one colour "
     "scale. Rows: task whose reward was used, last row: plain SAC; columns: task of the new agent. Mean over n = {n} "
-    "seeds; hatched: no seed there yet; star: fewer seeds than the study asks for."
+    "seeds; hatched: no seed there yet; star: fewer seeds than the study asks for; dagger: so many of its "
+    "agents are below their gate."
 )
 
 
 def heat_map_matrices(
     cs_reward: str, rows: pd.DataFrame, settings: Settings, published: Published
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Paper's and our ratios [sources + 1, tasks] (last row: SAC) and whether seeds are missing in ours."""
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Paper's and our ratios [sources + 1, tasks] (last row: SAC), whether seeds are missing in ours, and how many of
+    our agents are below their gate."""
     tasks = settings.multi_target.tasks
     cells = [[transfer_cell(rows, published, cs_reward, source, task) for task in tasks] for source in tasks]
     cells.append([baseline_cell(rows, published, cs_reward, task) for task in tasks])
     paper = np.array([[cell.paper.mean for cell in row] for row in cells])
     ours = np.array([[cell.ours.mean for cell in row] for row in cells])
     incomplete = np.array([[cell.ours.n < cell.expected for cell in row] for row in cells])
-    return paper, ours, incomplete
+    below = np.array([[cell.marks.get("below", 0) for cell in row] for row in cells])
+    return paper, ours, incomplete, below
 
 
 @styled
 def heat_map(cs_reward: str, rows: pd.DataFrame, settings: Settings, published: Published | None = None) -> Figure:
     """Draw the heat maps of Table 1 (action_norm) or Table 3 (velocity) from ``evaluation_rows``."""
-    paper, ours, incomplete = heat_map_matrices(cs_reward, rows, settings, published or load_published())
+    paper, ours, incomplete, below = heat_map_matrices(cs_reward, rows, settings, published or load_published())
+    plain = np.full(paper.shape, "")
+    marks = np.char.add(np.where(incomplete, "*", ""), np.where(below, np.char.add("\n†", below.astype(str)), ""))
     names = [SHORT.get(task, task) for task in settings.multi_target.tasks]
     figure = new_figure(TEXT_WIDTH, 3.0)
     left, right = figure.subplots(1, 2, sharey=True)
     top = float(np.nanmax([np.nanmax(paper, initial=1.0), np.nanmax(ours, initial=1.0)]))
     image = None
-    for index, (axes, values, title) in enumerate(((left, paper, "paper"), (right, ours, "ours"))):
+    for index, (axes, values, own, title) in enumerate(((left, paper, plain, "paper"), (right, ours, marks, "ours"))):
         image = _draw(axes, values, names, top)
-        _write(axes, values, np.zeros_like(incomplete) if title == "paper" else incomplete, top)
+        _write(axes, values, own, top)
         panel_title(axes, index, title)
     assert image is not None
     figure.colorbar(image, ax=[left, right], shrink=0.8, label=f"{quantity(cs_reward)} / target")
     left.set_ylabel("reward learned on")
     notes = scale_notes(settings.scale)
     notes += ["* fewer seeds than the study asks for"] if incomplete.any() else []
+    notes += ["† agents below their gate; they count in the mean"] if below.any() else []
     notes += [] if cs_reward in settings.cs_rewards else [NOT_ASKED]
     add_notes(figure, notes)
     return figure
@@ -85,12 +91,12 @@ def _draw(axes: Axes, values: np.ndarray, names: list[str], top: float) -> AxesI
     return image
 
 
-def _write(axes: Axes, values: np.ndarray, starred: np.ndarray, top: float) -> None:
+def _write(axes: Axes, values: np.ndarray, marks: np.ndarray, top: float) -> None:
     for (row, column), value in np.ndenumerate(values):
         if np.isfinite(value):
             ink = "white" if _luminance(value / top) < 0.18 else "black"
             weight = "bold" if row == column else "normal"
-            text = f"{value:.2f}{'*' if starred[row, column] else ''}"
+            text = f"{value:.2f}{marks[row, column]}"
             axes.text(column, row, text, ha="center", va="center", color=ink, fontsize=6.5, fontweight=weight)
 
 
