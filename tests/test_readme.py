@@ -174,3 +174,30 @@ def test_the_count_of_agents_with_task_and_behaviour_is_the_archives(checkout: P
     text = " ".join((checkout / "README.md").read_text(encoding="utf-8").split())
     assert with_both(checkout / "results" / "reference") in text
     assert with_both(checkout / "results" / "reference") not in text.replace("36 of 50", "46 of 50")
+
+
+def of_several_targets(archive: Path) -> list[str]:
+    """What findings counts of the agents on velocity rewards of several targets, on the reward's own task and off it."""
+    rows = read(archive, "evaluation").query("policy == 'stochastic' and kept == 'kept'")
+    means = rows.groupby(["folder", "metric"])["value"].mean().unstack()
+    named = r"transfer/multi_target/mt_csirl/velocity/(?P<source>[\w-]+)/(?P<task>[\w-]+)-t0/s\d+"
+    key = means.index.to_series().str.extract(f"^{named}$").dropna()
+    sac = means["velocity"][means.index.str.startswith("sac/")]
+    usual = sac.groupby(sac.index.str.extract(r"sac/([\w-]+)-t0", expand=False)).mean()
+    own, base = means.loc[key.index], key["task"].map(usual)
+    near, kept = (own["velocity"] - 0.8).abs() <= 0.2, own["success"] >= 0.9
+    like_sac = ((own["velocity"] - base).abs() < 0.25 * (0.8 - base)) & kept
+    off = key["source"] != key["task"]
+    return [
+        f"Of the {(~off).sum()} agents {(near & kept & ~off).sum()} succeed in at least 90 %",
+        f"Here {(near & off).sum()} of {off.sum()} are within 25 % of the target, {(kept & off).sum()} of {off.sum()} "
+        f"succeed and {(near & kept & off).sum()} do both. Only {(like_sac & off).sum()} of {off.sum()} are as",
+    ]
+
+
+def test_the_counts_of_agents_on_rewards_of_several_targets_are_the_archives(checkout: Path) -> None:
+    text = " ".join((checkout / "docs" / "findings.md").read_text(encoding="utf-8").split())
+    said = of_several_targets(checkout / "results" / "reference")
+    assert [words for words in said if words not in text] == []
+    for right, wrong in (("25 agents 16", "25 agents 17"), ("57 of 100", "58 of 100"), ("Only 14", "Only 15")):
+        assert any(words not in text.replace(right, wrong) for words in said)

@@ -19,6 +19,7 @@ from mtcsirl.figures.style import (
 )
 from mtcsirl.results.published import Published, load_published
 from mtcsirl.settings import Settings
+from mtcsirl.tables.cells import MARK_TEXTS, MARKS
 from mtcsirl.tables.cross_transfer import baseline_cell, transfer_cell
 
 COLOURS = colormaps["cividis"]
@@ -53,7 +54,8 @@ def heat_map(cs_reward: str, rows: pd.DataFrame, settings: Settings, published: 
     """Draw the heat maps of Table 1 (action_norm) or Table 3 (velocity) from ``evaluation_rows``."""
     paper, ours, incomplete, below = heat_map_matrices(cs_reward, rows, settings, published or load_published())
     plain = np.full(paper.shape, "")
-    marks = np.char.add(np.where(incomplete, "*", ""), np.where(below, np.char.add("\n†", below.astype(str)), ""))
+    counts = np.char.add(f"\n{MARKS['below']}", below.astype(str))
+    marks = np.char.add(np.where(incomplete, "*", ""), np.where(below, counts, ""))
     names = [SHORT.get(task, task) for task in settings.multi_target.tasks]
     figure = new_figure(TEXT_WIDTH, 3.0)
     left, right = figure.subplots(1, 2, sharey=True)
@@ -68,7 +70,7 @@ def heat_map(cs_reward: str, rows: pd.DataFrame, settings: Settings, published: 
     left.set_ylabel("reward learned on")
     notes = scale_notes(settings.scale)
     notes += ["* fewer seeds than the study asks for"] if incomplete.any() else []
-    notes += ["† agents below their gate; they count in the mean"] if below.any() else []
+    notes += [MARK_TEXTS["below"]] if below.any() else []
     notes += [] if cs_reward in settings.cs_rewards else [NOT_ASKED]
     add_notes(figure, notes)
     return figure
