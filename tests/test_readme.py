@@ -4,6 +4,7 @@ import re
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 from scipy import stats
 
@@ -63,10 +64,15 @@ def correlations(text: str) -> dict[str, list[str]]:
     return {first: rest[:2] for first, *rest in rows if first in CORRELATIONS}
 
 
+def agents_of(archive: Path) -> pd.DataFrame:
+    """Mean of each metric of each run's kept stochastic policy [folder, metric]."""
+    rows = read(archive, "evaluation").query("policy == 'stochastic' and kept == 'kept'")
+    return rows.groupby(["folder", "metric"])["value"].mean().unstack()
+
+
 def from_archive(archive: Path) -> dict[str, list[str]]:
     """What the rows must say: mean over seeds with its t-interval, and mean success, for each cs-reward."""
-    rows = read(archive, "evaluation").query("policy == 'stochastic' and kept == 'kept'")
-    means = rows.groupby(["folder", "metric"])["value"].mean().unstack()
+    means = agents_of(archive)
     found: dict[str, list[str]] = {name: [] for name in ALONE | UNSEEN}
     for name, pattern in (ALONE | UNSEEN).items():
         for metric in ("velocity", "action_norm"):
@@ -159,8 +165,7 @@ def test_it_marks_the_units_that_are_not_judged(checkout: Path) -> None:
 
 def with_both(archive: Path) -> str:
     """How many new agents on one task's rewards have the task and the behaviour."""
-    rows = read(archive, "evaluation").query("policy == 'stochastic' and kept == 'kept'")
-    means = rows.groupby(["folder", "metric"])["value"].mean().unstack()
+    means = agents_of(archive)
     both, every = 0, 0
     for metric, target in (("velocity", 0.8), ("action_norm", 3.0)):
         for pattern in ALONE.values():
@@ -177,9 +182,8 @@ def test_the_count_of_agents_with_task_and_behaviour_is_the_archives(checkout: P
 
 
 def of_several_targets(archive: Path) -> list[str]:
-    """What findings counts of the agents on velocity rewards of several targets, on the reward's own task and off it."""
-    rows = read(archive, "evaluation").query("policy == 'stochastic' and kept == 'kept'")
-    means = rows.groupby(["folder", "metric"])["value"].mean().unstack()
+    """What findings counts of the agents on velocity rewards of several targets, on their own task and off it."""
+    means = agents_of(archive)
     named = r"transfer/multi_target/mt_csirl/velocity/(?P<source>[\w-]+)/(?P<task>[\w-]+)-t0/s\d+"
     key = means.index.to_series().str.extract(f"^{named}$").dropna()
     sac = means["velocity"][means.index.str.startswith("sac/")]
