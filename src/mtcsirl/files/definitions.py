@@ -3,6 +3,7 @@
 A hash is that of the tree without comments, docstrings, annotations, imports and the words of raised errors; what it
 refers to is written by bare name, whatever module it stands in. So a better name for a file, a function moved to
 another module, another way to import it or a new comment change no hash; a constant, a default and an operation do.
+Nor does another version of Python: `ast.dump` has a form of its own in each, so trees are written here.
 """
 
 from __future__ import annotations
@@ -195,8 +196,24 @@ def _examine(module: str, node: ast.stmt) -> tuple[str, frozenset[Definition], f
     for part in ast.walk(tree):
         if isinstance(part, _Scope | ast.With | ast.If | ast.For | ast.While | ast.Try) and not part.body:
             part.body = [ast.Pass()]
-    digest = hashlib.sha256(ast.dump(tree).encode()).hexdigest()[:12]
+    digest = hashlib.sha256(written(tree).encode()).hexdigest()[:12]
     return digest, frozenset(canonical.found), frozenset(canonical.data)
+
+
+def written(tree: object) -> str:
+    """A tree as Python 3.11's `ast.dump` writes it; 3.12 adds `type_params`, 3.13 leaves out empty lists."""
+    if isinstance(tree, list):
+        return f"[{', '.join(map(written, tree))}]"
+    if not isinstance(tree, ast.AST):
+        return repr(tree)
+    fields = {name: getattr(tree, name) for name in tree._fields if hasattr(tree, name)}
+    told = {name: value for name, value in fields.items() if not _untold(tree, name, value)}
+    return f"{type(tree).__name__}({', '.join(f'{name}={written(value)}' for name, value in told.items())})"
+
+
+def _untold(node: ast.AST, name: str, value: object) -> bool:
+    """Whether 3.11 does not write a field: one that is left out in the code, or that it does not know yet."""
+    return (value is None and getattr(type(node), name, ...) is None) or (name == "type_params" and not value)
 
 
 def file_hash(path: Path) -> str:
@@ -208,7 +225,7 @@ def file_hash(path: Path) -> str:
     text = path.read_text(encoding="utf-8")
     tree = _Canonical(_parsed(path, "")).visit(ast.parse(text))
     imported = sorted(set(_imported_elsewhere(ast.parse(text))))
-    return hashlib.sha256("\n".join([ast.dump(tree), *imported]).encode()).hexdigest()[:12]
+    return hashlib.sha256("\n".join([written(tree), *imported]).encode()).hexdigest()[:12]
 
 
 def _imported_elsewhere(tree: ast.AST) -> Iterator[str]:
