@@ -5,10 +5,13 @@ from pathlib import Path
 import pytest
 
 from mtcsirl import cli
+from mtcsirl.files.identity import marker
 from mtcsirl.settings.loading import load
 from mtcsirl.study.ablations import ABLATIONS
 from mtcsirl.study.design import ARTEFACTS, design
+from mtcsirl.study.keys import Run, identity_of
 from tests.dag.conftest import Snakemake, job_counts
+from tests.study.made_up import finish
 
 
 def dry_run(snakemake: Snakemake, scale: str, *targets: str) -> dict[str, int]:
@@ -72,6 +75,29 @@ def test_a_run_outside_the_study_is_refused(planner: Snakemake) -> None:
     done = planner("-n", "results/expert/velocity/reach-t1/s7/.0123456789abcdef.made")
     assert done.returncode != 0
     assert "expert/velocity/reach-t1/s7 is no run of the study at scale desk" in done.stdout + done.stderr
+
+
+def test_what_is_missing_above_a_finished_run_is_made_whatever_is_missing_below(
+    planner: Snakemake, tmp_path: Path
+) -> None:
+    """A new agent and the expert below its reward, which is done: Snakemake alone forgets the agent."""
+    settings = load((), (f"results={tmp_path / 'results'}",))
+    agent = design(settings, "figure_2").transfers[0]
+    demonstrations = agent.irl.demonstrations[0]
+
+    def planned(*runs: Run) -> dict[str, int]:
+        hashes = {run: identity_of(run, settings).hash for run in runs}
+        targets = [f"{settings.results}/{run.folder}/{marker(hash)}" for run, hash in hashes.items()]
+        return dry_run(planner, "desk", *targets, "--config", f"results={settings.results}")
+
+    finish(demonstrations, settings)
+    rest = {"train_expert": 1, "transfer": 1}
+    assert planned(demonstrations.expert, agent) == rest | {"learn_reward": 1}
+    finish(agent.irl, settings)
+    assert planned(demonstrations.expert, agent) == rest
+    assert planned(agent) == {"transfer": 1}
+    finish(demonstrations.expert, settings)
+    assert planned(demonstrations.expert, agent) == {"transfer": 1}
 
 
 BAD = {

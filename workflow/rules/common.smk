@@ -29,7 +29,7 @@ from mtcsirl.study.plan import plan, request
 from mtcsirl.study.rates import load_rates
 from mtcsirl.study.runs import Baseline, Demonstrations, Expert, IrlRun, Score, Transfer
 from mtcsirl.study.screen import EXPECTED
-from mtcsirl.study.standing import settle
+from mtcsirl.study.standing import over_unfinished, settle
 from mtcsirl.study.status import before_it_starts
 from mtcsirl.worlds import drawable
 
@@ -51,6 +51,7 @@ except UserError as error:
 STUDY = design(SETTINGS)
 RUNS = {run.folder: run for name in (None, *ABLATIONS) for run in design(SETTINGS, name)}
 MADE = settle(RUNS.values(), SETTINGS, mark=workflow.is_main_process)
+OVER_UNFINISHED = over_unfinished(RUNS.values(), MADE, SETTINGS.results)
 MADE_PAGES = settle_artefacts([*ARTEFACTS, *ABLATIONS, *OTHERS], SETTINGS, mark=workflow.is_main_process)
 RATES = load_rates()
 RESULTS = SETTINGS.results
@@ -142,8 +143,13 @@ def markers(runs):
 
 
 def needed_by(kind):
-    """The markers of what a run reads."""
-    return lambda wildcards: markers(run_of(kind, wildcards).needs.values())
+    """The markers of what a run reads, if it does not stand already over a run that has to be made."""
+
+    def find(wildcards):
+        run = run_of(kind, wildcards)
+        return [] if run.folder in OVER_UNFINISHED else markers(run.needs.values())
+
+    return find
 
 
 def folders_of(kind, role):

@@ -1,13 +1,13 @@
 """How a run of the study stands: absent, incomplete, stale (and why) or done. One answer for everyone who asks."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from mtcsirl.errors import UserError
 from mtcsirl.files import storage
-from mtcsirl.files.identity import CHECKPOINT, Identity, Record, differences, lost, read_record, write_marker
+from mtcsirl.files.identity import CHECKPOINT, Identity, Record, differences, lost, marker, read_record, write_marker
 from mtcsirl.settings import Settings
 from mtcsirl.study.keys import Run, identity_of
 
@@ -82,3 +82,23 @@ def settle(runs: Iterable[Run[Any]], settings: Settings, *, mark: bool = True) -
             if done:
                 storage.remove(folder / CHECKPOINT)
     return wanted
+
+
+def over_unfinished(runs: Iterable[Run[Any]], hashes: Mapping[str, str], results: Path | str) -> frozenset[str]:
+    """The folders of the runs that are done although one that they were made from is not, by their markers.
+
+    Where Snakemake has to make the lower one it takes all above it for asked for, comes no further than the run that
+    is done, since markers are `ancient`, and so forgets what is missing above that (its issue 4166). A run that is done
+    therefore asks for nothing then.
+    """
+    over: dict[str, bool] = {}
+
+    def done(run: Run[Any]) -> bool:
+        return (Path(results) / run.folder / marker(hashes[run.folder])).exists()
+
+    def unfinished_below(run: Run[Any]) -> bool:
+        if run.folder not in over:
+            over[run.folder] = any(unfinished_below(needed) or not done(needed) for needed in run.needs.values())
+        return over[run.folder]
+
+    return frozenset([run.folder for run in runs if unfinished_below(run) and done(run)])
