@@ -1,4 +1,4 @@
-"""The README's numbers of the reference study are the archive's."""
+"""Numbers of the reference study in the README and in findings are the archive's."""
 
 import re
 from pathlib import Path
@@ -52,10 +52,13 @@ def correlations_from_archive(archive: Path) -> dict[str, list[str]]:
     return found
 
 
-def cells(text: str) -> dict[str, list[str]]:
-    """The tables' rows by their first cell, without marks."""
-    rows = [[cell.strip(" †") for cell in line.strip("|").split("|")] for line in text.splitlines() if line[:2] == "| "]
-    return {first: rest for first, *rest in rows if first in ALONE | UNSEEN}
+def cells(readme: str, findings: str) -> dict[str, list[str]]:
+    """The rows of the README on unseen tasks and of findings on one task, by their first cell, without marks."""
+    found: dict[str, list[str]] = {}
+    for text, names in ((readme, UNSEEN), (findings, ALONE)):
+        rows = [line.strip("|").split("|") for line in text.splitlines() if line[:2] == "| "]
+        found |= {row[0].strip(): [cell.strip(" †") for cell in row[1:]] for row in rows if row[0].strip() in names}
+    return found
 
 
 def correlations(text: str) -> dict[str, list[str]]:
@@ -83,23 +86,29 @@ def from_archive(archive: Path) -> dict[str, list[str]]:
     return found
 
 
-def test_its_table_says_what_the_archive_says(checkout: Path) -> None:
-    text = (checkout / "README.md").read_text(encoding="utf-8")
-    assert cells(text) == from_archive(checkout / "results" / "reference")
-    assert correlations(text) == correlations_from_archive(checkout / "results" / "reference")
-    assert f"{len(archived(checkout / 'results' / 'reference'))} of its 1,111 runs" in text
+@pytest.fixture
+def pages(checkout: Path) -> tuple[str, str]:
+    """The README, and findings behind it."""
+    readme, findings = (checkout / page for page in ("README.md", "docs/findings.md"))
+    return readme.read_text(encoding="utf-8"), findings.read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize("changed", [("0.82 [", "0.83 ["), ("| 0.96 |", "| 1.00 |")])
-def test_a_changed_number_is_noticed(checkout: Path, changed: tuple[str, str]) -> None:
-    text = (checkout / "README.md").read_text(encoding="utf-8").replace(*changed, 1)
-    assert cells(text) != from_archive(checkout / "results" / "reference")
+def test_the_tables_say_what_the_archive_says(checkout: Path, pages: tuple[str, str]) -> None:
+    archive = checkout / "results" / "reference"
+    assert cells(*pages) == from_archive(archive)
+    assert correlations(pages[1]) == correlations_from_archive(archive)
+    assert f"{len(archived(archive))} of its 1,111 runs" in pages[0]
+
+
+@pytest.mark.parametrize("changed", [("0.82 [", "0.83 ["), ("| 0.96 |", "| 1.00 |"), ("| 0.28 |", "| 0.38 |")])
+def test_a_changed_number_is_noticed(checkout: Path, pages: tuple[str, str], changed: tuple[str, str]) -> None:
+    readme, findings = (page.replace(*changed, 1) for page in pages)
+    assert cells(readme, findings) != from_archive(checkout / "results" / "reference")
 
 
 @pytest.mark.parametrize("changed", [("0.27 [0.00", "0.87 [0.00"), ("[0.22, 0.48]", "[0.23, 0.48]")])
-def test_a_changed_correlation_is_noticed(checkout: Path, changed: tuple[str, str]) -> None:
-    text = (checkout / "README.md").read_text(encoding="utf-8").replace(*changed, 1)
-    assert correlations(text) != correlations_from_archive(checkout / "results" / "reference")
+def test_a_changed_correlation_is_noticed(checkout: Path, pages: tuple[str, str], changed: tuple[str, str]) -> None:
+    assert correlations(pages[1].replace(*changed, 1)) != correlations_from_archive(checkout / "results" / "reference")
 
 
 def said_of_claims(text: str) -> dict[str, str]:
@@ -126,24 +135,48 @@ def test_another_verdict_is_noticed(checkout: Path) -> None:
     assert not said_of_claims("C1 is\n*reproduced* (8 met)").items() <= judged(page).items()
 
 
-def successes(archive: Path) -> str:
-    """What the README must say of the success of new agents on unseen tasks."""
-    rows = from_archive(archive)
-    velocity, norm = (100 * np.mean([float(rows[task][column]) for task in UNSEEN]) for column in (1, 3))
-    return f"they succeed in {velocity:.0f} and {norm:.0f} % of their episodes"
+METHODS = {
+    "Expert": "expert/{metric}/{task}-t0",
+    "SAC": "sac/{task}-t0",
+    "MT-AIRL": "transfer/multi_task/mt_airl/{metric}/all/{task}-t0",
+    "MT-VAIRL": "transfer/multi_task/mt_vairl/{metric}/all/{task}-t0",
+    "MT-VAIRL-GP": "transfer/multi_task/mt_vairl_gp/{metric}/all/{task}-t0",
+    "MT-CSIRL": "transfer/multi_task/mt_csirl/{metric}/all/{task}-t0",
+    "MT-CSIRL+LT": "transfer/multi_task/mt_csirl_lt/{metric}/all/{task}-t0",
+}
+"""The rows of Table 2 and the folders of their agents."""
 
 
-def test_the_share_of_successes_is_the_archives(checkout: Path) -> None:
-    text = " ".join((checkout / "README.md").read_text(encoding="utf-8").split())
-    assert successes(checkout / "results" / "reference") in text
+def table_2(text: str) -> dict[str, list[str]]:
+    """Ours in each row of the README's Table 2, without the paper's and marks: metric and success, twice."""
+    rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in text.splitlines() if line[:2] == "| "]
+    ours = {first: rest[::2] for first, *rest in rows if first in METHODS and len(rest) == 8}
+    return {name: [cell.partition(" †")[0] for cell in cells] for name, cells in ours.items()}
 
 
-def test_another_share_is_noticed(checkout: Path) -> None:
-    assert successes(checkout / "results" / "reference") not in "they succeed in 99 and 100 % of their episodes"
+def table_2_from_archive(archive: Path) -> dict[str, list[str]]:
+    """Mean over seeds of the means over unseen tasks, and their standard deviation; a dash if a task lacks seeds."""
+    means, found = agents_of(archive), {}
+    for name, pattern in METHODS.items():
+        found[name] = ["–"] * 4
+        for column, metric in ((0, "velocity"), (2, "action_norm")):
+            folders = [[f"{pattern.format(metric=metric, task=task)}/s{seed}" for task in UNSEEN] for seed in range(5)]
+            if {folder for seed in folders for folder in seed} <= set(means.index):
+                seeds = pd.DataFrame([means.loc[seed].mean() for seed in folders])
+                found[name][column] = f"{seeds[metric].mean():.2f} ± {seeds[metric].std():.2f}"
+                found[name][column + 1] = f"{100 * seeds['success'].mean():.1f}"
+    return found
+
+
+def test_its_table_2_is_the_archives(checkout: Path) -> None:
+    text = (checkout / "README.md").read_text(encoding="utf-8")
+    archive = checkout / "results" / "reference"
+    assert table_2(text) == table_2_from_archive(archive)
+    assert table_2(text.replace("| 42.0 |", "| 99.2 |")) != table_2_from_archive(archive), "a changed one is noticed"
 
 
 def marked(text: str) -> set[str]:
-    """The units of C3 that the README marks as not judged, as the results page names them."""
+    """The units of C3 that findings mark as not judged, as the results page names them."""
     rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in text.splitlines() if line[:2] == "| "]
     cells = {first.removesuffix(" alone"): rest for first, *rest in rows if first in ALONE}
     names = {"velocity": 1, "action norm": 3}
@@ -156,8 +189,8 @@ def not_judged(page: str) -> set[str]:
     return set(re.findall(r"^\| ([^|]+) \| precondition not met \|", section, re.MULTILINE))
 
 
-def test_it_marks_the_units_that_are_not_judged(checkout: Path) -> None:
-    text = (checkout / "README.md").read_text(encoding="utf-8")
+def test_findings_mark_the_units_that_are_not_judged(checkout: Path) -> None:
+    text = (checkout / "docs" / "findings.md").read_text(encoding="utf-8")
     page = (checkout / "docs" / "results.md").read_text(encoding="utf-8")
     assert marked(text) == not_judged(page) != set()
     assert marked(text.replace("| 0.86 † |", "| 0.86 |", 1)) != not_judged(page), "a lost mark is noticed"
@@ -181,6 +214,14 @@ def test_the_count_of_agents_with_task_and_behaviour_is_the_archives(checkout: P
     assert with_both(checkout / "results" / "reference") not in text.replace("36 of 50", "46 of 50")
 
 
+def test_its_two_correlations_are_those_of_findings(checkout: Path) -> None:
+    one, _, six, _ = (
+        row[0].partition(" ")[0] for row in correlations_from_archive(checkout / "results" / "reference").values()
+    )
+    text = " ".join((checkout / "README.md").read_text(encoding="utf-8").split())
+    assert f"is {one} for the velocity, the paper's 0.18; of six tasks' f {six}, the paper's 0.88" in text
+
+
 def of_several_targets(archive: Path) -> list[str]:
     """What findings counts of the agents on velocity rewards of several targets, on their own task and off it."""
     means = agents_of(archive)
@@ -201,7 +242,7 @@ def of_several_targets(archive: Path) -> list[str]:
 
 def test_the_counts_of_agents_on_rewards_of_several_targets_are_the_archives(checkout: Path) -> None:
     text = " ".join((checkout / "docs" / "findings.md").read_text(encoding="utf-8").split())
-    said = of_several_targets(checkout / "results" / "reference")
-    assert [words for words in said if words not in text] == []
+    counts = of_several_targets(checkout / "results" / "reference")
+    assert [words for words in counts if words not in text] == []
     for right, wrong in (("25 agents 16", "25 agents 17"), ("57 of 100", "58 of 100"), ("Only 14", "Only 15")):
-        assert any(words not in text.replace(right, wrong) for words in said)
+        assert any(words not in text.replace(right, wrong) for words in counts)
