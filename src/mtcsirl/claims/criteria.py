@@ -236,7 +236,7 @@ def _against_single(evidence: Evidence, rules: Rules, several: RewardSource, sin
         cs, task, ours, parts, "lead over one task's reward / SAC's gap", value, holds=Interval(needed, np.inf),
         paper_value=_lead_in_paper(evidence.published, cs, home, task, rules["method"], ours.target),
     )  # fmt: skip
-    groups = ours, theirs, own, sac
+    groups = ours, theirs, own, sac, sac_own
     unit = checked(evidence, against(unit, ours, theirs, f"{home}'s reward"), rules, single, *groups, pairs=lead.n)
     why, failed = evidence.blocked(several, ["experts"], rules["gates"])
     if why and unit.state in JUDGED:

@@ -16,6 +16,7 @@ from mtcsirl.claims.judging import (
     NO_GAP,
     NOT_MET,
     RUINED,
+    SAC_FAILS,
     TRANSFERS,
     UNCLEAR,
     UNDECIDED,
@@ -34,10 +35,12 @@ from mtcsirl.claims.judging import (
     three_way,
     worst,
 )
-from mtcsirl.claims.preconditions import checked, no_gap, works_at_home
+from mtcsirl.claims.preconditions import checked, failing, no_gap, works_at_home
 from mtcsirl.results.contrasts import Nearness, equivalence_power, nearness
 from mtcsirl.results.published import in_paper_order
 from mtcsirl.results.statistics import Interval, Summary
+
+OUTCOMES = (LIKE_SAC, TRANSFERS, RUINED, FARTHER, UNDECIDED, NO_GAP, SAC_FAILS)
 
 
 def equivalent_to_sac(evidence: Evidence, rules: Rules) -> Iterator[Unit]:
@@ -88,7 +91,7 @@ def stays_behind(evidence: Evidence, rules: Rules) -> Iterator[Unit]:
             group, own = evidence.transfers(source, others), evidence.transfers(source, [home])
             sac, sac_own = evidence.sac(cs, others), evidence.sac(cs, [home])
             lead = behind(group, own)
-            fates = {task: _fate(group.on(task), sac.on(task), rules) for task in others}
+            fates = {task: _fate(evidence, group.on(task), sac.on(task), rules) for task in others}
             parts = [
                 staying_below(group.distance, sac.distance, rules["at_most"]),
                 surely("behind its own task, seed by seed", (1.0, lead)),
@@ -109,13 +112,16 @@ def stays_behind(evidence: Evidence, rules: Rules) -> Iterator[Unit]:
             yield unit if against_it else works_at_home(unit, own, sac_own, rules)
 
 
-def _fate(group: Group, sac: Group, rules: Rules) -> Answer:
+def _fate(evidence: Evidence, group: Group, sac: Group, rules: Rules) -> Answer:
     """Of one task: whether the behaviour surely does not transfer to an agent that succeeds, and what became of it.
 
-    A task without a gap says neither: whoever is near SAC there is on target too.
+    A task without a gap says neither: whoever is near SAC there is on target too. Nor does one that plain SAC fails.
     """
+    settings = evidence.settings
     if no_gap(sac, rules):
         return UNCLEAR, NO_GAP
+    if failing(sac, "SAC agents", settings.seeds, settings.gates.success, rules["gates"]):
+        return UNCLEAR, SAC_FAILS
     success = at_least(group.sure_success, rules["success"], "")
     much = closing(group.distance, sac.distance, rules["needs_diagonal"])
     little = staying_below(group.distance, sac.distance, rules["needs_diagonal"])
@@ -126,7 +132,9 @@ def _fate(group: Group, sac: Group, rules: Rules) -> Answer:
     else:
         like = staying_below(group.distance, sac.distance, rules["at_most"])
         away = staying_below(group.distance, sac.distance, -rules["at_most"])
-        outcome = (FARTHER if away[0] == MET else LIKE_SAC) if worst([success, like]) == MET else UNDECIDED
+        beyond = nearness(group.metric, sac.metric, group.target, 1.0).above  # on the far side of the target
+        other = FARTHER if away[0] == MET or beyond else LIKE_SAC
+        outcome = other if worst([success, like]) == MET else UNDECIDED
     return worst([success, little]), outcome
 
 
@@ -140,5 +148,5 @@ def _most(states: list[str], share: float) -> Answer:
 
 def _summed(outcomes: list[str]) -> str:
     """As in "3 like SAC, 1 agent ruined"; all alike: without numbers."""
-    names = [name for name in (LIKE_SAC, TRANSFERS, RUINED, FARTHER, UNDECIDED, NO_GAP) if name in outcomes]
+    names = [name for name in OUTCOMES if name in outcomes]
     return names[0] if len(names) == 1 else ", ".join(f"{outcomes.count(name)} {name}" for name in names)

@@ -29,7 +29,7 @@ TOO_FEW, BLOCKED, NOT_RUN = "too few seeds", "precondition not met", "not run"
 SHOWN = "not judged"
 """A unit that stands beside the judged ones for comparison."""
 LIKE_SAC, TRANSFERS, RUINED, FARTHER = "like SAC", "behaviour transfers", "agent ruined", "farther than SAC"
-NO_GAP = "no gap to close"
+NO_GAP, SAC_FAILS = "no gap to close", "SAC fails there"
 UNDECIDED = "undecided"
 """What became of new agents where the claim is that nothing does."""
 NO_ESTIMATE = Estimate(np.nan, np.nan, np.nan, 0)
