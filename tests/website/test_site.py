@@ -19,6 +19,7 @@ from tests.report.browser import CHROMIUM
 READ = ("docs", "website", "src", "examples", "mkdocs.yml", "README.md", "CONTRIBUTING.md", "CHANGELOG.md")
 READ += ("LICENSE", "CITATION.cff", "benchmarks/results.json", "benchmarks/results.png")
 READ += tuple(f"paper_figs/{file.name}" for file in (CHECKOUT / "paper_figs").glob("figure_*.png"))
+READ += ("results/reference/claims/claims.png",)
 needs_chromium = pytest.mark.skipif(CHROMIUM is None, reason="chromium is not installed: apt-get install chromium")
 
 
@@ -33,7 +34,7 @@ def source(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A copy of all that the site is made from, so that tests may break it."""
     folder = tmp_path_factory.mktemp("source")
     for name in READ:
-        (folder / name).parent.mkdir(exist_ok=True)
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
         if (CHECKOUT / name).is_dir():
             shutil.copytree(CHECKOUT / name, folder / name, ignore=shutil.ignore_patterns("__pycache__"))
         else:
