@@ -50,16 +50,20 @@ def correlations_from_archive(archive: Path) -> dict[str, list[str]]:
     return found
 
 
+def table_rows(text: str, without: str = " ") -> list[list[str]]:
+    """The cells of each row of the tables in a page, stripped of the characters ``without``."""
+    rows = [line.strip("|").split("|") for line in text.splitlines() if line[:2] == "| "]
+    return [[cell.strip(without) for cell in row] for row in rows]
+
+
 def cells(text: str) -> dict[str, list[str]]:
     """The rows on unseen tasks and on one task by their first cell, without marks."""
-    rows = [[cell.strip(" †") for cell in line.strip("|").split("|")] for line in text.splitlines() if line[:2] == "| "]
-    return {first: rest for first, *rest in rows if first in ALONE | UNSEEN}
+    return {first: rest for first, *rest in table_rows(text, " †") if first in ALONE | UNSEEN}
 
 
 def correlations(text: str) -> dict[str, list[str]]:
     """The rows of the correlations by their first cell, without the paper's and marks."""
-    rows = [[cell.strip(" †") for cell in line.strip("|").split("|")] for line in text.splitlines() if line[:2] == "| "]
-    return {first: rest[:2] for first, *rest in rows if first in CORRELATIONS}
+    return {first: rest[:2] for first, *rest in table_rows(text, " †") if first in CORRELATIONS}
 
 
 def agents_of(archive: Path) -> pd.DataFrame:
@@ -157,8 +161,7 @@ def test_the_shares_of_successes_are_the_archives(checkout: Path) -> None:
 
 def table_2(text: str) -> dict[str, list[str]]:
     """Ours in each row of the README's Table 2, without the paper's and marks: metric and success, twice."""
-    rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in text.splitlines() if line[:2] == "| "]
-    ours = {first: rest[::2] for first, *rest in rows if first in METHODS and len(rest) == 8}
+    ours = {first: rest[::2] for first, *rest in table_rows(text) if first in METHODS and len(rest) == 8}
     return {name: [cell.partition(" †")[0] for cell in cells] for name, cells in ours.items()}
 
 
@@ -187,8 +190,7 @@ def test_its_table_2_is_the_archives(checkout: Path) -> None:
 
 def marked(text: str) -> set[str]:
     """The units of C3 that findings mark as not judged, as the results page names them."""
-    rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in text.splitlines() if line[:2] == "| "]
-    cells = {first.removesuffix(" alone"): rest for first, *rest in rows if first in ALONE}
+    cells = {first.removesuffix(" alone"): rest for first, *rest in table_rows(text) if first in ALONE}
     names = {"velocity": 1, "action norm": 3}
     return {f"{name}, {task}" for task, rest in cells.items() for name, column in names.items() if "†" in rest[column]}
 

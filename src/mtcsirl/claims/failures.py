@@ -35,7 +35,7 @@ from mtcsirl.claims.judging import (
     three_way,
     worst,
 )
-from mtcsirl.claims.preconditions import checked, failing, no_gap, works_at_home
+from mtcsirl.claims.preconditions import checked, no_gap, sac_fails, works_at_home
 from mtcsirl.results.contrasts import Nearness, equivalence_power, nearness
 from mtcsirl.results.published import in_paper_order
 from mtcsirl.results.statistics import Interval, Summary
@@ -117,10 +117,9 @@ def _fate(evidence: Evidence, group: Group, sac: Group, rules: Rules) -> Answer:
 
     A task without a gap says neither: whoever is near SAC there is on target too. Nor does one that plain SAC fails.
     """
-    settings = evidence.settings
     if no_gap(sac, rules):
         return UNCLEAR, NO_GAP
-    if failing(sac, "SAC agents", settings.seeds, settings.gates.success, rules["gates"]):
+    if sac_fails(evidence, sac, rules):
         return UNCLEAR, SAC_FAILS
     success = at_least(group.sure_success, rules["success"], "")
     much = closing(group.distance, sac.distance, rules["needs_diagonal"])
