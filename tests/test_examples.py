@@ -1,7 +1,6 @@
 """The scripts in examples/ run as printed, and are short."""
 
 import os
-import platform
 import re
 import subprocess
 import sys
@@ -11,9 +10,7 @@ import pytest
 
 from mtcsirl.agents.sac import FusedSac
 from mtcsirl.episodes.demonstrations import collect_demonstrations
-from mtcsirl.files.identity import read_record
-from mtcsirl.files.storage import checksum, read_csv, read_json, write_parquet
-from mtcsirl.results.archive import unpack
+from mtcsirl.files.storage import read_json, write_parquet
 from mtcsirl.rewards.learned import load_learned_reward, save_learned_reward
 from mtcsirl.settings import SacSettings
 from mtcsirl.settings.runs import DemonstrationRunSettings
@@ -63,23 +60,3 @@ def test_a_method_of_ones_own_learns_a_reward(tmp_path: Path) -> None:
     _run("own_method.py", tmp_path, *given, *settings, *config)
     assert load_learned_reward(tmp_path / "out").method == "mt_gail"
     assert "own_method.py" in read_json(tmp_path / "out" / "identity.json")["code"]
-
-
-@pytest.mark.skipif(platform.machine() != "x86_64", reason="the kernels of an x86-64 processor")
-def test_the_archive_is_made_again_to_the_byte_on_any_x86_processor(tmp_path: Path) -> None:
-    """Acting and simulating: a demonstration. Learning: the curve of the first 250 updates of a training."""
-    shown, expert = "demonstrations/velocity/reach-wall-t0/s0", "expert/velocity/reach-wall-t0/s0"
-    trained = "expert/velocity/drawer-close-t1/s0"
-    unpack(CHECKOUT / "results" / "reference", tmp_path, [shown, expert, trained])
-    record = read_record(tmp_path / shown)
-    assert record is not None
-    what = ("--cs-reward", "velocity", "--seed", "0")
-    given = ("--expert", expert, "--task", "reach-wall", "--target", "0", "--settings", f"{shown}/settings.json")
-    _run("archive_kernels.py", tmp_path, "collect-demonstrations", *given, *what, "--output", "again/shown")
-    assert checksum(tmp_path / "again/shown/demonstrations.parquet") == record.files["demonstrations.parquet"]
-
-    given = ("--task", "drawer-close", "--target", "1", "--settings", f"{trained}/settings.json", "--set", "steps=2500")
-    _run("archive_kernels.py", tmp_path, "train-expert", *given, *what, "--output", "again/trained")
-    curves = [read_csv(tmp_path / folder / "curve.csv").query("step <= 1500") for folder in (trained, "again/trained")]
-    assert {"critic_loss", "velocity"} <= set(curves[0]["metric"])
-    assert curves[0].equals(curves[1])

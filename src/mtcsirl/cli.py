@@ -17,6 +17,7 @@ try:  # Ctrl-C at once is no fault of an import
     from typing import NoReturn
 
     from mtcsirl import __version__
+    from mtcsirl.agents import kernels
     from mtcsirl.commands import (
         archive,
         artefacts,
@@ -88,6 +89,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     words = ["mtcsirl", *(sys.argv[1:] if arguments is None else arguments)]
     try:
         with stop.heeded():
+            kernels.choose(os.environ)
             backend(os.environ)
             load_from_environment()
             parsed = parser().parse_args(arguments)

@@ -130,3 +130,6 @@ def distance_metric(cs_reward: str) -> str:
 CURVE_COLUMNS = ("task", "target", "step", "metric", "value")
 DIAGNOSTIC_COLUMNS = ("task", "target", "step", "discriminator", "metric", "value")
 """Of an IRL run's curve.csv and diagnostics.csv; rows on the generator have no discriminator."""
+
+KERNELS = "MTCSIRL_KERNELS"
+"""The environment variable that asks for the arithmetic of another maker's processor (agents/kernels.py)."""

@@ -17,7 +17,7 @@ from snakemake.logging import logger
 from mtcsirl.errors import UserError
 from mtcsirl.extensions import VARIABLE
 from mtcsirl.files.identity import marker
-from mtcsirl.names import EXPERIMENTS, TASKS
+from mtcsirl.names import EXPERIMENTS, KERNELS, TASKS
 from mtcsirl.settings.loading import configured, read_yaml
 from mtcsirl.settings.machine import check_study
 from mtcsirl.settings.template import as_json
@@ -61,12 +61,14 @@ os.environ["PATH"] = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PAT
 os.environ[VARIABLE] = os.pathsep.join(SETTINGS.extensions)
 # whether scenes can be drawn is one answer for the whole workflow
 os.environ[drawable.VARIABLE] = drawable.lacking() or ""
+os.environ.setdefault(KERNELS, "")
 
 
 envvars:
     "PATH",
     VARIABLE,
     drawable.VARIABLE,
+    KERNELS,
 
 
 pathvars:

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from mtcsirl.files.storage import checksum, write_json
+from mtcsirl.names import KERNELS
 
 PACKAGES = ("metaworld", "mujoco", "gymnasium", "torch", "numpy", "stable-baselines3", "snakemake")
 
@@ -35,7 +36,7 @@ def commit() -> str:
 
 
 def machine() -> dict[str, Any]:
-    """Processor, cores, the kernels that numpy's OpenBLAS was asked for, and operating system."""
+    """Processor, cores, the kernels that numpy's OpenBLAS or all libraries were asked for, and operating system."""
     model = platform.processor()
     cpuinfo = Path("/proc/cpuinfo")
     if cpuinfo.is_file():
@@ -49,6 +50,7 @@ def machine() -> dict[str, Any]:
         "openblas": os.environ.get("OPENBLAS_CORETYPE", "its own choice"),
         "system": platform.platform(),
         "python": platform.python_version(),
+        **({"kernels": os.environ[KERNELS]} if os.environ.get(KERNELS) else {}),
     }
 
 
