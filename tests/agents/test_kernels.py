@@ -54,10 +54,15 @@ def test_an_archived_training_starts_as_it_did(tmp_path: Path) -> None:
     trained = "expert/velocity/drawer-close-t1/s0"
     unpack(CHECKOUT / "results" / "reference", tmp_path, [trained])
     asked = ("train-expert", "--task", "drawer-close", "--target", "1", "--settings", f"{trained}/settings.json")
-    _mtcsirl(tmp_path, *asked, "--set", "steps=2500", "--output", "again", **{KERNELS: "amd"})
-    curves = [read_csv(tmp_path / folder / "curve.csv").query("step <= 1500") for folder in (trained, "again")]
-    assert {"critic_loss", "velocity"} <= set(curves[0]["metric"])
-    assert curves[0].equals(curves[1])
+    asked += ("--set", "steps=2500")
+    _mtcsirl(tmp_path, *asked, "--output", "same", **{KERNELS: "amd"})
+    _mtcsirl(tmp_path, *asked, "--output", "other", **ELSEWHERE)
+    archived, same, other = (
+        read_csv(tmp_path / folder / "curve.csv").query("step <= 1500") for folder in (trained, "same", "other")
+    )
+    assert {"critic_loss", "velocity"} <= set(archived["metric"])
+    assert same.equals(archived)
+    assert not other.equals(archived)
 
 
 def test_nothing_is_chosen_unasked() -> None:
