@@ -6,6 +6,7 @@ import pytest
 
 from mtcsirl import cli
 from mtcsirl.files.identity import marker
+from mtcsirl.names import KERNELS
 from mtcsirl.settings.loading import load
 from mtcsirl.study.ablations import ABLATIONS
 from mtcsirl.study.design import ARTEFACTS, design
@@ -121,3 +122,15 @@ def test_a_bad_configuration_is_one_line_and_leaves_no_trace(planner: Snakemake,
     assert says in line
     assert "Traceback" not in done.stderr
     assert {path.name for path in tmp_path.iterdir()} <= {".snakemake"}, "no result is written"
+
+
+def test_kernels_that_there_are_not_end_it_before_it_starts(
+    snakemake: Snakemake, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv(KERNELS, "zen")
+    done = snakemake("--cores", "1", "sac/reach-wall-t0/s0", cwd=tmp_path)
+    assert done.returncode != 0
+    assert done.stderr.splitlines()[-1] == f"{KERNELS}=zen: must be amd, or not be set"
+    assert {path.name for path in tmp_path.iterdir()} <= {".snakemake"}
+    monkeypatch.setenv(KERNELS, "amd")
+    assert job_counts(snakemake("-n", "figure_1", "--quiet", "rules")) == {"figure_1": 1}

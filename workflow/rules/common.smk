@@ -14,6 +14,7 @@ from pathlib import Path
 from snakemake.exceptions import WorkflowError
 from snakemake.logging import logger
 
+from mtcsirl.agents import kernels
 from mtcsirl.errors import UserError
 from mtcsirl.extensions import VARIABLE
 from mtcsirl.files.identity import marker
@@ -43,6 +44,7 @@ try:
     files = sorted(workflow.configfiles if workflow.is_main_process else (), key=lambda f: Path(f).resolve() in given)
     written = [(str(file), read_yaml(file)) for file in files]
     SETTINGS = configured(config, [*written, ("--config", workflow.config_settings.config or {})])
+    kernels.asked(os.environ)
     if workflow.is_main_process and workflow.resource_settings.nodes is None:
         check_study(SETTINGS)  # jobs run here and not on the nodes of a cluster
 except UserError as error:

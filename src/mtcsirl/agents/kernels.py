@@ -9,7 +9,7 @@ made the evidence archive, on Linux on any x86-64 processor with AVX2.
 import ctypes
 import mmap
 import platform
-from collections.abc import MutableMapping
+from collections.abc import Mapping, MutableMapping
 from pathlib import Path
 
 from mtcsirl.errors import UserError
@@ -23,19 +23,28 @@ _MKL_IS_ASKED = {"mkl_serv_intel_cpu": 0, "mkl_serv_intel_cpu_true": 0, "mkl_ser
 _WRITABLE = mmap.PROT_READ | mmap.PROT_WRITE | mmap.PROT_EXEC
 
 
+def asked(environment: Mapping[str, str]) -> str:
+    """What ``MTCSIRL_KERNELS`` asks for; nothing where it is not set.
+
+    Raises:
+        UserError: it has another value, or asks for what this machine cannot do.
+    """
+    value = environment.get(KERNELS, "")
+    if value not in ("", AMD):
+        raise UserError(f"{KERNELS}={value}: must be {AMD}, or not be set")
+    if value and (platform.system(), platform.machine()) != ("Linux", "x86_64"):
+        raise UserError(f"{KERNELS}={value}: needs Linux on an x86-64 processor; unset it")
+    return value
+
+
 def choose(environment: MutableMapping[str, str]) -> None:
     """Make the choices that ``MTCSIRL_KERNELS`` asks for; numpy must not be loaded yet.
 
     Raises:
         UserError: the variable has another value, or they cannot be made here.
     """
-    asked = environment.get(KERNELS, "")
-    if not asked:
+    if not asked(environment):
         return
-    if asked != AMD:
-        raise UserError(f"{KERNELS}={asked}: must be {AMD}, or not be set")
-    if (platform.system(), platform.machine()) != ("Linux", "x86_64"):
-        raise UserError(f"{KERNELS}={asked}: needs Linux on an x86-64 processor; unset it")
     environment.update(CORE_TYPE)  # before numpy is loaded, which reads it then
 
     from mtcsirl.agents import products

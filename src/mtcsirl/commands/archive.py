@@ -1,4 +1,4 @@
-"""The verb of the evidence archive: add finished runs, check it, restore runs from it, draw some to make again."""
+"""The verb of the evidence archive: add finished runs, check it, restore runs, draw some to make again, take files."""
 
 import argparse
 import sys
@@ -26,8 +26,10 @@ def register(verbs: Verbs) -> None:
         "archive",
         lambda parsed: ACTIONS[parsed.action](parsed),
         does="keep what one needs to check every number without training, restore runs, and hold new ones against it",
-        needs="add: finished runs in the results folder; compare: runs that were made again there; else an archive",
-        writes="add: a new part below --archive; unpack, draw: folders of runs below the results; else nothing",
+        needs="add: finished runs in the results folder; compare: runs that were made again there; fill: restored runs "
+        "there and others made again in --again; else an archive",
+        writes="add: a new part below --archive; unpack, draw: folders of runs below the results; fill: files that the "
+        "archive had not kept, below the results; else nothing",
     )
     verb.add_argument("action", choices=tuple(ACTIONS), metavar="ACTION", help=", ".join(ACTIONS))
     verb.add_argument("--archive", type=path, default=ARCHIVE, metavar="DIR", help=f"default: {ARCHIVE}")
@@ -35,6 +37,7 @@ def register(verbs: Verbs) -> None:
     verb.add_argument("--irl-runs", type=natural, default=2, metavar="N", help="draw: so many IRL runs; default 2")
     verb.add_argument("--draw-seed", type=seed, default=0, metavar="SEED", help="draw: decides which; default 0")
     verb.add_argument("--runs", type=natural, metavar="N", help="verify: fail unless the archive holds so many runs")
+    verb.add_argument("--again", type=path, metavar="DIR", help="fill: the results folder to take files from")
     add_artefact(verb)
     add_study_settings(verb)
 
@@ -154,6 +157,19 @@ def _compare(parsed: argparse.Namespace) -> None:
     print(f"{equal} of {len(found.made)} runs have the archive's bytes{rest}")
 
 
+def _fill(parsed: argparse.Namespace) -> None:
+    from mtcsirl.results.filling import fill
+
+    if parsed.again is None:
+        raise UserError("archive fill: name the results folder to take files from: --again DIR")
+    results = Path(study_settings(parsed).results)
+    found = fill(results, parsed.again)
+    for name in found.other:
+        print(f"{parsed.again / name}: has not the archive's bytes; left alone")
+    print(f"{len(found.taken)} files taken from {parsed.again}, {len(found.other)} left alone")
+    print(f"{len(found.missing)} that the archive had not kept are still missing below {results}")
+
+
 ACTIONS = {
     "add": _add,
     "verify": _verify,
@@ -161,4 +177,5 @@ ACTIONS = {
     "summary": _summary,
     "draw": _draw,
     "compare": _compare,
+    "fill": _fill,
 }
