@@ -19,7 +19,7 @@ from tests.report.browser import CHROMIUM
 READ = ("docs", "website", "src", "examples", "mkdocs.yml", "README.md", "CONTRIBUTING.md", "CHANGELOG.md")
 READ += ("LICENSE", "CITATION.cff", "benchmarks/results.json", "benchmarks/results.png")
 READ += tuple(f"paper_figs/{file.name}" for file in (CHECKOUT / "paper_figs").glob("figure_*.png"))
-READ += ("results/reference/claims/claims.png",)
+READ += ("results/reference/claims/claims.png", *(f"results/reference/tables/table_{n}.md" for n in range(1, 6)))
 needs_chromium = pytest.mark.skipif(CHROMIUM is None, reason="chromium is not installed: apt-get install chromium")
 
 
