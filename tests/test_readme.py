@@ -2,6 +2,7 @@
 
 import json
 import re
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -149,9 +150,8 @@ METHODS = {
 def successes(archive: Path) -> str:
     """What the README must say of the success of new agents on unseen tasks."""
     rows = from_archive(archive)
-    first, *rest = (f"{rows[f'unseen {task}'][1]} and {rows[f'unseen {task}'][3]}" for task in UNSEEN_TASKS)
-    on = [f"on {task}" for task in UNSEEN_TASKS]
-    return ", ".join([f"{first} of their episodes {on[0]}", *map(" ".join, zip(rest, on[1:], strict=True))])
+    said = [f"{rows[f'unseen {task}'][1]} and {rows[f'unseen {task}'][3]} on {task}" for task in UNSEEN_TASKS]
+    return f"Success is {', '.join(said)}"
 
 
 def test_the_shares_of_successes_are_the_archives(checkout: Path) -> None:
@@ -218,30 +218,54 @@ def test_findings_mark_the_units_that_are_not_judged(checkout: Path) -> None:
     assert marked(text.replace("| 0.86 † |", "| 0.86 |", 1)) != not_judged(page), "a lost mark is noticed"
 
 
-def with_both(archive: Path) -> str:
-    """How many new agents on one task's rewards have the task and the behaviour."""
-    means = agents_of(archive)
-    both, every = 0, 0
+def of_new_agents(archive: Path, patterns: Mapping[str, str]) -> pd.DataFrame:
+    """Of each new agent: its task, whether it is within 25 % of the target, and whether it keeps its task."""
+    means, found = agents_of(archive), []
     for metric, target in (("velocity", 0.8), ("action_norm", 3.0)):
-        for pattern in ALONE.values():
+        for name, pattern in patterns.items():
             own = means[means.index.str.fullmatch(re.escape(pattern.format(metric=metric)) + r"/s\d+")]
-            both += int(((own["success"] >= 0.9) & ((own[metric] - target).abs() <= 0.25 * target)).sum())
-            every += len(own)
-    return f"{both} of {every} the task too"
+            near = (own[metric] - target).abs() <= 0.25 * target
+            found.append(pd.DataFrame({"on": name, "near": near, "kept": own["success"] >= 0.9}))
+    return pd.concat(found)
 
 
-def test_the_count_of_agents_with_task_and_behaviour_is_the_archives(checkout: Path) -> None:
+def counted(archive: Path) -> list[str]:
+    """What the README must count of new agents on one task's rewards, and on six tasks' rewards on unseen tasks."""
+    one, six = of_new_agents(archive, ALONE), of_new_agents(archive, UNSEEN)
+    close = int(six[six["on"] == "unseen drawer-close"]["kept"].sum())
+    behave, six_behave = (f"{agents['near'].sum()} of {len(agents)}" for agents in (one, six))
+    return [
+        f"So far {behave} new agents get the behaviour from one task's reward. Of {len(six)} on unseen tasks,",
+        f"rewards, {six_behave.partition(' ')[0]} get it and {(~six['kept']).sum()} lose the task.",
+        f"{behave} have the behaviour, and {(one['near'] & one['kept']).sum()} of {len(one)} the task too",
+        f"Of {len(six)} on MT-CSIRL's f {six['kept'].sum()} keep their task, {close} of them on drawer-close.",
+    ]
+
+
+@pytest.mark.parametrize("wrong", [("36 of 50", "46 of 50"), ("27 lose", "28 lose"), ("13 keep", "10 keep")])
+def test_the_counts_of_new_agents_are_the_archives(checkout: Path, wrong: tuple[str, str]) -> None:
     text = " ".join((checkout / "README.md").read_text(encoding="utf-8").split())
-    assert with_both(checkout / "results" / "reference") in text
-    assert with_both(checkout / "results" / "reference") not in text.replace("36 of 50", "46 of 50")
+    said = counted(checkout / "results" / "reference")
+    assert [words for words in said if words not in text] == []
+    assert any(words not in text.replace(*wrong) for words in said), "a changed one is noticed"
 
 
-def test_its_two_correlations_are_those_of_findings(checkout: Path) -> None:
-    one, _, six, _ = (
-        row[0].partition(" ")[0] for row in correlations_from_archive(checkout / "results" / "reference").values()
+def correlations_in_words(archive: Path) -> str:
+    """What the README must say of r on SAC's transitions of reach-wall, and of r of -r_task alone there."""
+    one, _, six, norm = (row[0].partition(" ")[0] for row in correlations_from_archive(archive).values())
+    scores = read(archive, "scores").query("statistic == 'pearson' and reward == 'minus_task' and transitions == 'sac'")
+    alone = scores[scores["folder"].str.startswith(CORRELATIONS["one task, velocity"])]["value"]
+    return (
+        f"velocity's r is {one}, the paper's 0.18, but -r_task alone has {mean_correlation(alone).value:.2f}; "
+        f"of six tasks' f it is {six}, the norm's {norm}, the paper's 0.88 and 0.86"
     )
+
+
+def test_its_correlations_are_the_archives(checkout: Path) -> None:
     text = " ".join((checkout / "README.md").read_text(encoding="utf-8").split())
-    assert f"is {one} for the velocity, the paper's 0.18; of six tasks' f {six}, the paper's 0.88" in text
+    said = correlations_in_words(checkout / "results" / "reference")
+    assert said in text
+    assert said not in text.replace("alone has 0.76", "alone has 0.36")
 
 
 def of_several_targets(archive: Path) -> tuple[list[str], str]:
@@ -261,10 +285,10 @@ def of_several_targets(archive: Path) -> tuple[list[str], str]:
         at_home.append((near & kept & ~off).sum())
         counts.append([(what & off).sum() for what in (near, kept, near & kept, like_sac)])
     return [
-        f"Of the velocity's 25 agents {at_home[0]}, of the norm's {at_home[1]} succeed in at least 90 %",
+        f"{at_home[0]} of the velocity's 25 agents and {at_home[1]} of the norm's 25 succeed in at least 90 %",
         *(f" | {velocity} | {norm} | " for velocity, norm in zip(*counts, strict=True)),
-        f"usable agent elsewhere ({counts[0][2] + counts[1][2]} of 200)",
-    ], "{} behave, {} keep the task, {} are as SAC".format(*(counts[0][k] + counts[1][k] for k in (0, 1, 3)))
+        f"of 200 agents elsewhere {counts[0][2] + counts[1][2]} have both",
+    ], "{} have the behaviour, {} keep the task, {} do both; {} are".format(*map(sum, zip(*counts, strict=True)))
 
 
 def test_the_counts_of_agents_on_rewards_of_several_targets_are_the_archives(
@@ -274,5 +298,10 @@ def test_the_counts_of_agents_on_rewards_of_several_targets_are_the_archives(
     counts, in_readme = of_several_targets(checkout / "results" / "reference")
     assert in_readme in readme
     assert [words for words in counts if words not in text] == []
-    for right, wrong in (("agents 16", "agents 17"), ("| 57 |", "| 58 |"), ("| 5 |", "| 6 |"), ("(29 of", "(30 of")):
+    for right, wrong in (
+        ("16 of the", "17 of the"),
+        ("| 57 |", "| 58 |"),
+        ("| 5 |", "| 6 |"),
+        (" 29 have", " 30 have"),
+    ):
         assert any(words not in text.replace(right, wrong) for words in counts)

@@ -49,7 +49,7 @@ def register(verbs: Verbs) -> None:
         verbs,
         "target",
         _target,
-        does="print what to ask snakemake for to make runs: snakemake --cores 1 $(mtcsirl target sac/reach-t0/s0)",
+        does="print what to ask snakemake for to make runs: snakemake --cores 1 $(mtcsirl target sac/reach-wall-t0/s0)",
         needs="nothing",
         writes="nothing",
     )
