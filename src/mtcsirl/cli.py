@@ -135,7 +135,7 @@ def explained(error: Exception) -> str | None:
     """The one line for what a user can mend: mistakes, disks, permissions, memory; None for a bug."""
     text = str(error)
     if isinstance(error, UserError):
-        return " ".join(text.split("\n"))
+        return console.plain(text)
     if isinstance(error, MemoryError) or any(words in text.lower() for words in _NO_MEMORY):
         return f"out of memory ({_first_line(text) or 'nothing left'}); give the job more, or choose smaller sizes"
     if isinstance(error, RecursionError):

@@ -149,10 +149,11 @@ def test_fewer_than_five_seeds_are_inconclusive(against):
 
 def test_agents_that_share_a_learned_reward_are_not_independent():
     found = judge_all(settings=SETTINGS.model_copy(update={"irl_seeds": (0,)}))
-    of_rewards = [finding for finding in found if finding.name != "C1"]
+    own = {"C1": "experts learn from no reward", "C12": "an ablation has IRL seeds of its own"}
+    of_rewards = [finding for finding in found if finding.name not in own]
     assert {finding.verdict for finding in of_rewards} == {"inconclusive"}
     assert "1 of the 5 independent seeds" in of_rewards[0].units[0].reason
-    assert found[0].verdict == "reproduced", "experts learn from no reward"
+    assert {finding.verdict for finding in found if finding.name in own} == {"reproduced"}, own
 
 
 def test_failed_experts_are_a_failed_precondition():

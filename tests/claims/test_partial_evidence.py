@@ -123,10 +123,10 @@ def successes(values):
     """The group of new agents with these shares of ten episodes, one a seed."""
     import pandas as pd
 
-    from mtcsirl.claims.evidence import Group
+    from mtcsirl.claims.groups import Group
 
     frame = pd.DataFrame({"velocity": 0.8, "success": values})
-    return Group("transfer", {"reach": frame}, "velocity", 0.8, episodes=10)
+    return Group("transfer", "new agents", {"reach": frame}, "velocity", 0.8, episodes=10)
 
 
 @pytest.mark.parametrize(

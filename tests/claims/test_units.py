@@ -6,7 +6,7 @@ import pandas as pd
 import pytest
 
 from mtcsirl.claims.claims import claims_json, claims_markdown, load_criteria
-from mtcsirl.claims.evidence import Group
+from mtcsirl.claims.groups import Group
 from mtcsirl.claims.judging import MET, NOT_MET, closing
 from mtcsirl.claims.unit_text import COLUMNS, unit_texts
 from mtcsirl.results.rows import select

@@ -16,6 +16,7 @@ from mtcsirl import cli
 from mtcsirl.errors import UserError
 from mtcsirl.files import storage
 from mtcsirl.files.identity import FILE, NOT_RESULTS, NOTE, read_record, result_files
+from mtcsirl.files.lock import locked
 from mtcsirl.results import archive, packing
 from mtcsirl.rewards.learned import load_learned_reward
 from mtcsirl.settings import Settings
@@ -193,6 +194,28 @@ def test_a_folder_that_holds_anything_is_left_alone(whole, tmp_path):
     assert not again.restored
 
 
+def test_a_folder_that_a_job_holds_or_fills_meanwhile_is_left_alone(whole, made, tmp_path, monkeypatch):
+    with locked(tmp_path / IRL.folder):
+        found = archive.unpack(whole, tmp_path)
+    assert found.left_alone == (IRL.folder,)
+    assert not (tmp_path / IRL.folder / FILE).exists()
+    check = archive._taken
+    monkeypatch.setattr(
+        archive, "_taken", lambda folder: made_meanwhile(folder) if folder.name == "s0" else check(folder)
+    )
+
+    def made_meanwhile(folder):
+        """Nothing is there at the first look; then a job ends."""
+        if folder.relative_to(out) == Path(IRL.folder) and not folder.exists():
+            shutil.copytree(made / IRL.folder, folder)
+            return False
+        return check(folder)
+
+    out = tmp_path / "out"
+    assert IRL.folder in archive.unpack(whole, out).left_alone
+    assert files(out / IRL.folder) == files(made / IRL.folder)
+
+
 def test_an_unpack_that_was_killed_goes_on(whole, tmp_path):
     archive.unpack(whole, tmp_path)
     before = files(tmp_path)
@@ -235,6 +258,35 @@ def test_a_run_made_again_is_a_new_part_and_replaces_the_old_one_in_reads(copy, 
     for folder in readers:
         assert f"{copy}: {folder}: its reward had other bytes than the archive's {IRL.folder}" in wrong
     assert len(archive.read(copy, "evaluation")) == len(archive.read(copy, "evaluation").drop_duplicates())
+
+
+def test_a_run_of_other_settings_replaces_none_unless_asked_to(copy, made, tmp_path, capsys):
+    """The default archive is the reference study's: a forgotten --archive must not put smoke runs into it."""
+    before, at = files(copy), settings(tmp_path / "other")
+    other = at.model_copy(update={"sac": at.sac.model_copy(update={"discount": 0.9})})
+    results = Path(shutil.copytree(made, tmp_path / "other"))
+    run = SHOWN.expert
+    shutil.rmtree(results / run.folder)
+    write(run, other)
+    with pytest.raises(
+        UserError, match=r"another run than the archive's: sac\.discount: 0\.97 -> 0\.9; nothing was added"
+    ):
+        archive.add(copy, results, [run.folder], [])
+    assert files(copy) == before
+    assert archive.add(copy, results, [run.folder], [], replace=True) == copy / "part-0002"
+    words = ["--archive", str(copy), "--settings", settings(tmp_path / "out").model_dump_json()]
+    for action in ("unpack", "summary"):
+        assert cli.main(["archive", action, *words]) == 0
+        *_, last = capsys.readouterr().out.splitlines()
+        assert last.startswith("1 of these are stale under the present settings and code, the first another run")
+
+
+def test_an_archive_does_not_lie_among_runs(made, tmp_path):
+    results = Path(shutil.copytree(made, tmp_path / "results"))
+    for place in (results, results / IRL.folder):
+        with pytest.raises(UserError, match="holds runs; name another folder for the archive"):
+            archive.add(place, results, [IRL.folder], [])
+        assert not list(place.glob("part-*"))
 
 
 def test_policies_asked_for_later_are_added_once(copy, made):

@@ -33,7 +33,18 @@ def test_seeds_are_averaged_after_tasks():
 
 def test_a_cell_knows_the_runs_that_count():
     cell = make_cell(rows([[0.4, 0.6], [np.nan, 0.7]], tasks=("a", "b")), "velocity", UNKNOWN)
-    assert cell.folders == ("a/s0", "b/s0", "b/s1"), "an agent without a number is no row of it"
+    assert cell.folders == ("a/s0", "b/s0"), "nor is an agent whose seed lacks another task"
+    assert cell.unaveraged == 1
+
+
+def test_marks_that_speak_of_the_mean_are_of_agents_that_are_in_it():
+    frame = rows([[0.4, 0.6], [100.0, np.nan]], tasks=("a", "b"))
+    last = frame["seed"] == 1
+    frame.loc[last & (frame["task"] == "a"), ["status", "diverged"]] = ["below gate", 1]
+    frame.loc[last & (frame["task"] == "b"), "status"] = "missing"
+    assert make_cell(frame, "velocity", UNKNOWN).marks == {"missing": 1}
+    frame.loc[last & (frame["task"] == "b"), ["value", "status"]] = [0.7, "ok"]
+    assert make_cell(frame, "velocity", UNKNOWN).marks == {"below": 1, "diverged": 1}
 
 
 def test_inside_and_outside_the_papers_prediction_interval():

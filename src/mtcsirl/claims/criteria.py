@@ -9,8 +9,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from mtcsirl.claims.evidence import Evidence, Group, RewardSource, behind, multi_target, multi_task, single_target
+from mtcsirl.claims.evidence import Evidence, RewardSource, multi_target, multi_task, single_target
 from mtcsirl.claims.failures import equivalent_to_sac, stays_behind
+from mtcsirl.claims.groups import Group, behind
 from mtcsirl.claims.judging import (
     BLOCKED,
     JUDGED,
@@ -133,10 +134,8 @@ def _all_unseen(evidence: Evidence, rules: Rules, unit: Unit) -> Unit:
     experts = evidence.experts(cs, tasks).distance
     answer, _ = surely("", (1.0, ours), (-1.0, experts))
     test = welch(ours, experts)
-    note = (
-        f'"not as strongly as the ground truth": {answer}; d is {test.difference:+.2f} [{test.low:+.2f}, '
-        f"{test.high:+.2f}] larger than the experts'"
-    )
+    bounds = f" [{test.low:+.2f}, {test.high:+.2f}]" if np.isfinite(test.low) else ""
+    note = f'"not as strongly as the ground truth": {answer}; d less the experts\' is {test.difference:+.2f}{bounds}'
     notes = (*unit.notes, note) if experts.n and ours.n else unit.notes
     return replace(unit, what="all unseen tasks", state=SHOWN, notes=notes)
 
@@ -201,9 +200,8 @@ def suffers_without(evidence: Evidence, rules: Rules) -> Iterator[Unit]:
         unit = judged_unit(
             cs, task, without, parts, "success lost without the curriculum", value, holds=Interval(needed, np.inf)
         )  # fmt: skip
-        unit = checked(
-            evidence, against(unit, without, with_it, "with the curriculum"), rules, source, with_it, without
-        )
+        unit = against(unit, without, with_it, "with the curriculum")
+        unit = checked(evidence, unit, rules, source, with_it, without, irl_seeds=seeds)
         # Where they fail with it as well, they have nothing to lose.
         why = failing(with_it, "generators with it", seeds, evidence.settings.gates.success, rules["gates"])
         yield unjudged(unit, BLOCKED, why) if why and unit.state in JUDGED else unit

@@ -1,117 +1,22 @@
-"""What the claims are judged on: groups of agents, their distances to the target, and their preconditions."""
+"""What the claims are judged on: the agents of a study in groups, their preconditions, and points of rewards."""
 
 from collections.abc import Collection, Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from mtcsirl.claims.gates import failed, needed
-from mtcsirl.names import EVALUATION_TARGET, LAST, distance_metric
+from mtcsirl.claims.gates import failed, needed, unusable
+from mtcsirl.claims.groups import Group, name_of, shared_rewards
+from mtcsirl.names import EVALUATION_TARGET, LAST
 from mtcsirl.results.published import Published
 from mtcsirl.results.rows import KEY, OK, select
-from mtcsirl.results.statistics import Summary, probability_of_improvement, summarise
 from mtcsirl.rewards.ground_truth import COMMON_SENSE_REWARDS
 from mtcsirl.settings import Settings
 from mtcsirl.study.design import design
 from mtcsirl.study.runs import IrlRun, Score
-
-
-@dataclass(frozen=True)
-class Group:
-    """One kind of agent over seeds and tasks, judged by one cs-reward with the target value ``target``.
-
-    ``agents``: per task a frame of the stochastic policy's metrics [seed, metric]; ``episodes``: that each of them had;
-    ``last``: the same agents with their last policies where the kept ones are judged, else None.
-    """
-
-    stage: str
-    agents: Mapping[str, pd.DataFrame]
-    cs_reward: str
-    target: float
-    episodes: int
-    last: "Group | None" = None
-
-    @property
-    def folders(self) -> set[str]:
-        """Folders of the runs whose numbers count."""
-        known = [frame[frame[self.cs_reward].notna()] for frame in self.agents.values() if self.cs_reward in frame]
-        return {folder for frame in known for folder in frame["folder"]}
-
-    def on(self, task: str) -> "Group":
-        """The group on one of its tasks."""
-        last = None if self.last is None else self.last.on(task)
-        return replace(self, agents={task: self.agents[task]}, last=last)
-
-    def values(self, metric: str) -> pd.DataFrame:
-        """``metric`` [seed, task]; NaN where an agent is not usable."""
-        nothing = pd.Series(dtype=float)
-        return pd.DataFrame({task: frame.get(metric, nothing) for task, frame in self.agents.items()}, dtype=float)
-
-    @cached_property
-    def distances(self) -> pd.DataFrame:
-        """d = |metric - target| [seed, task]."""
-        return (self.values(self.cs_reward) - self.target).abs()
-
-    @cached_property
-    def metric(self) -> Summary:
-        """The cs-reward's metric over seeds, mean over tasks per seed."""
-        return summarise(per_seed(self.values(self.cs_reward)))
-
-    @cached_property
-    def distance(self) -> Summary:
-        """d over seeds, mean over tasks per seed."""
-        return summarise(per_seed(self.distances))
-
-    @cached_property
-    def gap(self) -> Summary:
-        """target - metric over seeds, mean over tasks per seed: d with its sign."""
-        return summarise(per_seed(self.target - self.values(self.cs_reward)))
-
-    @cached_property
-    def success(self) -> Summary:
-        """Share of successful episodes over seeds, mean over tasks per seed."""
-        return summarise(per_seed(self.values("success")))
-
-    @property
-    def sure_success(self) -> Summary:
-        """``success`` with at least the spread that its episodes have by chance."""
-        return at_least_by_chance(self.success, self.episodes * len(self.agents))
-
-    @cached_property
-    def step_distance(self) -> Summary:
-        """E|m - tau| of single steps over seeds: no oscillation about the target hides in it. n = 0 if not recorded."""
-        return summarise(per_seed(self.values(distance_metric(self.cs_reward))))
-
-
-def per_seed(values: pd.DataFrame) -> pd.Series:
-    """Mean over tasks of each seed [seed]; NaN if one of its tasks is not usable."""
-    return values.mean(axis=1, skipna=False)
-
-
-def at_least_by_chance(success: Summary, episodes: int) -> Summary:
-    """The share p with a spread over seeds of at least sqrt(p (1 - p) / episodes), which so many episodes a seed have.
-
-    Seeds that happen to agree on 9 of 10 episodes are no surer of it than seeds that do not.
-    """
-    mean, std, n = success
-    return Summary(mean, max(std, float(np.sqrt(max(mean * (1 - mean), 0.0) / episodes))), n)
-
-
-def behind(far: Group, near: Group) -> Summary:
-    """d(far) - d(near) of agents of the same seed, mean over each group's tasks."""
-    return summarise(per_seed(far.distances) - per_seed(near.distances))
-
-
-def closer(first: Group, second: Group) -> float:
-    """Probability that an agent of ``first`` is closer to the target than one of ``second``, mean over common tasks."""
-    ours, theirs = first.distances, second.distances
-    tasks = [task for task in ours.columns if task in theirs.columns]
-    if not tasks or ours[tasks].isna().all(axis=None) or theirs[tasks].isna().all(axis=None):
-        return np.nan
-    return probability_of_improvement(-ours[tasks].to_numpy(), -theirs[tasks].to_numpy())
 
 
 @dataclass(frozen=True)
@@ -158,14 +63,15 @@ class Evidence:
         """
         seeds = seeds or (self.settings.irl_seeds if key["stage"] == "learn_reward" else self.settings.seeds)
         names = [key.get(name, "") for name in ("stage", "experiment", "method", "cs_reward", "source")]
-        goal = COMMON_SENSE_REWARDS[cs_reward].target
-        nothing = np.array([], dtype=int)
+        goal, nothing = COMMON_SENSE_REWARDS[cs_reward].target, np.array([], dtype=int)
+        shared = shared_rewards(self.settings) if key["stage"] == "transfer" else None
 
         def of(agents: pd.DataFrame, places: Mapping[Any, Any], last: Group | None) -> Group:
             found = {task: places.get((*names, task, target), nothing) for task in tasks}
             own = {task: agents.iloc[place] for task, place in found.items()}
             frames = {task: rows[rows["seed"].isin(list(seeds))].set_index("seed") for task, rows in own.items()}
-            return Group(key["stage"], frames, cs_reward, goal, self.settings.evaluation.episodes, last)
+            episodes = self.settings.evaluation.episodes
+            return Group(key["stage"], name_of(key), frames, cs_reward, goal, episodes, last, shared)
 
         tasks = tuple(tasks)
         last = of(self._last, self._places[1], None) if len(self._last) else None
@@ -193,23 +99,27 @@ class Evidence:
         key = {"stage": "learn_reward", **source.key}
         return self.group(source.cs_reward, tasks or source.tasks, key, source.targets[0], seeds)
 
-    def blocked(self, source: "RewardSource", needs: Iterable[str], share: float) -> tuple[str, bool]:
+    def blocked(
+        self, source: "RewardSource", needs: Iterable[str], share: float, irl_seeds: Collection[int] = ()
+    ) -> tuple[str, bool]:
         """Which of ``needs`` ("experts", "generators") of ``source`` failed their gate too often, or are not known to
         have passed it; ("", False) if none. True: they failed, whatever those that are missing will do.
 
         An expert passes if it and its demonstrations do. Of n agents the whole number nearest to ``share`` x n has to
         pass, so that one of three may fail where 80 % are asked for. Those that are missing count in n.
+        ``irl_seeds``: of its IRL runs, unless the study's.
         """
-        seeds = {"experts": source.expert_seeds(self.settings), "generators": self.settings.irl_seeds}
+        irl_seeds = tuple(irl_seeds) or self.settings.irl_seeds
+        seeds = {"experts": source.expert_seeds(self.settings, irl_seeds), "generators": irl_seeds}
         keys: dict[str, dict[str, Any]] = {
             "experts": {
                 "stage": ["train_expert", "collect_demonstrations"],
                 "cs_reward": source.cs_reward,
                 "task": list(source.tasks),
                 "target": list(source.targets),
-                "seed": list(source.expert_seeds(self.settings)),
+                "seed": list(seeds["experts"]),
             },
-            "generators": {"stage": "learn_reward", **source.key, "seed": list(self.settings.irl_seeds)},
+            "generators": {"stage": "learn_reward", **source.key, "seed": list(irl_seeds)},
         }
         for name in needs:
             found = select(self._agents, **keys[name])
@@ -218,14 +128,18 @@ class Evidence:
             lost = int(failed(found["status"]).groupby(each).any().sum())
             count = len(source.tasks) * len(source.targets) * len(set(seeds[name]))
             if passed < needed(share, count):
-                unknown = f", {count - passed - lost} missing" if count > passed + lost else ""
+                useless = int((unusable(found["status"]) & ~failed(found["status"])).groupby(each).any().sum())
+                missing = max(count - passed - lost - useless, 0)
+                unknown = f", {missing} missing" if missing else ""
+                unknown += f", {useless} without an evaluation that counts" if useless else ""
                 return f"{passed} of {count} {name} passed their gate{unknown}", count - lost < needed(share, count)
         return "", False
 
     def scored(self, source: "RewardSource", task: str) -> pd.DataFrame:
         """The single transitions on which the rewards of ``source`` were scored for ``task``."""
         place = self._scored_places.get((*source.key.values(), task))
-        return self.points.iloc[[] if place is None else place]
+        own = self.points.iloc[[] if place is None else place]
+        return own[own["seed"].isin(list(self.settings.irl_seeds))] if len(own) else own
 
     def score_folders(self, source: "RewardSource", task: str) -> list[str]:
         """Folders of the scores that ``scored`` reads, below the results."""
@@ -270,9 +184,9 @@ class RewardSource:
         """Its columns in the rows."""
         return {name: getattr(self, name) for name in ("experiment", "method", "cs_reward", "source")}
 
-    def expert_seeds(self, settings: Settings) -> tuple[int, ...]:
+    def expert_seeds(self, settings: Settings, irl_seeds: tuple[int, ...]) -> tuple[int, ...]:
         """Seeds of the experts that its IRL runs imitate: each its own, but of several targets all the first."""
-        return settings.seeds[:1] if self.one_expert else settings.irl_seeds
+        return settings.seeds[:1] if self.one_expert else irl_seeds
 
     @property
     def one_expert(self) -> bool:

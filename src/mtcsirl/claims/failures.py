@@ -8,7 +8,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from mtcsirl.claims.evidence import Evidence, Group, behind, multi_target, single_target
+from mtcsirl.claims.evidence import Evidence, multi_target, single_target
+from mtcsirl.claims.groups import Group, behind
 from mtcsirl.claims.judging import (
     FARTHER,
     LIKE_SAC,

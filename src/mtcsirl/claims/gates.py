@@ -2,12 +2,17 @@
 
 import pandas as pd
 
-from mtcsirl.results.rows import MISSING, OK, STALE
+from mtcsirl.results.rows import BELOW_GATE, MISSING, OK, STALE
 
 
 def failed(states: pd.Series) -> pd.Series:
-    """Which agents failed, whatever those will do that are missing or stale."""
-    return ~states.isin([OK, MISSING, STALE])
+    """Which agents failed, whatever those will do that are missing, or that have no evaluation that counts."""
+    return states == BELOW_GATE
+
+
+def unusable(states: pd.Series) -> pd.Series:
+    """Which agents have an evaluation that says nothing of them: damaged, copied or another's."""
+    return ~states.isin([OK, BELOW_GATE, MISSING, STALE])
 
 
 def needed(share: float, count: int) -> int:

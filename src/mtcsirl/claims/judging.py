@@ -6,7 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from mtcsirl.claims.evidence import Evidence, Group, closer
+from mtcsirl.claims.evidence import Evidence
+from mtcsirl.claims.groups import Group, closer
 from mtcsirl.results.contrasts import SpreadRatio, fieller, spread_ratio
 from mtcsirl.results.published import NOT_PRINTED
 from mtcsirl.results.statistics import (
@@ -33,6 +34,7 @@ NO_GAP, SAC_FAILS = "no gap to close", "SAC fails there"
 UNDECIDED = "undecided"
 """What became of new agents where the claim is that nothing does."""
 NO_ESTIMATE = Estimate(np.nan, np.nan, np.nan, 0)
+ROUNDING = 1e-9
 Rules = Mapping[str, Any]
 Answer = tuple[str, str]
 """(met, not met or unclear; about what)."""
@@ -153,10 +155,10 @@ def three_way(holds: bool, refuted: bool, about: str) -> Answer:
 def surely(about: str, *terms: tuple[float, Summary], constant: float = 0.0) -> Answer:
     """Met if the contrast (see ``statistics.contrast``) is at least 0, not met if it is below, each surely.
 
-    Surely: by its one-sided 95 % bound.
+    Surely: by its one-sided 95 % bound. What floating point makes of the limit itself is on it.
     """
     test = contrast(*terms, constant=constant, confidence=ONE_SIDED)
-    return three_way(test.low >= 0, test.high < 0, about)
+    return three_way(test.low >= -ROUNDING, test.high < -ROUNDING, about)
 
 
 def at_least(summary: Summary, limit: float, about: str) -> Answer:

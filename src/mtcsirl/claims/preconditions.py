@@ -4,8 +4,9 @@ from collections.abc import Collection
 from dataclasses import replace
 from pathlib import Path
 
-from mtcsirl.claims.evidence import Evidence, Group, RewardSource
+from mtcsirl.claims.evidence import Evidence, RewardSource
 from mtcsirl.claims.gates import failed, needed
+from mtcsirl.claims.groups import Group
 from mtcsirl.claims.judging import (
     BLOCKED,
     JUDGED,
@@ -24,12 +25,19 @@ CONDITIONAL = "conditional on the experts: all IRL seeds imitate those of the fi
 
 
 def checked(
-    evidence: Evidence, unit: Unit, rules: Rules, source: RewardSource | None, *groups: Group, pairs: int | None = None
+    evidence: Evidence,
+    unit: Unit,
+    rules: Rules,
+    source: RewardSource | None,
+    *groups: Group,
+    pairs: int | None = None,
+    irl_seeds: Collection[int] = (),
 ) -> Unit:
     """The unit, or why it cannot be judged: no results, failed experts, generators or SAC, no gap, too few seeds.
 
     Every one of ``groups`` that is plain SAC is asked for its task and for room between it and the target; ``pairs``:
-    seeds of which both agents are there, where they are compared seed by seed.
+    seeds of which both agents are there, where they are compared seed by seed; ``irl_seeds``: of the IRL runs of
+    ``source``, unless the study's.
     """
     settings = evidence.settings
     results = Path(settings.results)
@@ -38,8 +46,10 @@ def checked(
     )
     unit = replace(unit, folders=tuple(folders))
     seeds = [group.metric.n for group in groups] + ([] if pairs is None else [pairs])
+    absent = [group.name for group in groups if group.metric.n == 0]
     if min(seeds) == 0:
-        return unjudged(unit, NOT_RUN, "no agent has been trained for this, or none is usable")
+        none = f"of {', '.join(dict.fromkeys(absent))} none" if 0 < len(absent) < len(groups) else "no agent"
+        return unjudged(unit, NOT_RUN, f"{none} has been trained for this, or none is usable")
     for group in (group for group in groups if group.stage == "train_sac"):
         why = sac_fails(evidence, group, rules)
         if why:
@@ -48,8 +58,8 @@ def checked(
         if group.metric.n >= rules["seeds"] and no_gap(group, rules):
             return unjudged(unit, BLOCKED, "SAC alone is on target: there is no gap to close")
     if source is not None:
-        seeds.append(len(set(settings.irl_seeds)))
-    return checked_runs(evidence, unit, rules, source, min(seeds))
+        seeds.append(len(set(irl_seeds or settings.irl_seeds)))
+    return checked_runs(evidence, unit, rules, source, min(seeds), irl_seeds)
 
 
 def no_gap(sac: Group, rules: Rules) -> bool:
@@ -62,12 +72,19 @@ def unjudged(unit: Unit, state: str, reason: str) -> Unit:
     return replace(unit, state=state, outcome="", reason=reason)
 
 
-def checked_runs(evidence: Evidence, unit: Unit, rules: Rules, source: RewardSource | None, seeds: int) -> Unit:
+def checked_runs(
+    evidence: Evidence,
+    unit: Unit,
+    rules: Rules,
+    source: RewardSource | None,
+    seeds: int,
+    irl_seeds: Collection[int] = (),
+) -> Unit:
     """The unit, or why it cannot be judged, for units without agents: correlations."""
     if seeds == 0:
         return unjudged(unit, NOT_RUN, "no reward has been scored for this")
     if source is not None:
-        why, failed = evidence.blocked(source, rules["needs"], rules["gates"])
+        why, failed = evidence.blocked(source, rules["needs"], rules["gates"], irl_seeds)
         if why:
             return unjudged(unit, BLOCKED if failed else NOT_RUN, why)
         if source.one_expert:

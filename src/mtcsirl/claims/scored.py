@@ -87,7 +87,8 @@ def _answer(found: Beyond, rest: Estimate, rules: Rules) -> Answer:
     state, reason = ask(found, rules)
     bent, _ = ask(replace(found, partial=rest), rules)
     if state in (MET, NOT_MET) and bent != state:
-        return UNCLEAR, f"{reason}, but {bent} within tenths of r_task, where r = {_text(rest)}"
+        left = "nothing of one of the rewards is left" if np.isnan(rest.value) else f"r = {_text(rest)}"
+        return UNCLEAR, f"{reason}, but {bent} within tenths of r_task, where {left}"
     return state, reason
 
 
@@ -118,9 +119,11 @@ def _large(found: Beyond, rules: Rules) -> Answer:
 
 
 def _nothing(found: Beyond) -> str:
-    if np.isnan(found.raw.value):
-        return "the learned or the true reward does not vary"
-    return f"r = {found.raw.value:.2f} says nothing beyond r_task: the learned reward is a function of it"
+    seeds = found.flat or found.nothing
+    where = "" if len(seeds) == found.partial.n else f"IRL seed {', '.join(map(str, seeds))}: "
+    if found.flat:
+        return f"{where}the learned or the true reward does not vary"
+    return f"{where}r_task says all that the learned or the true reward does (r = {found.raw.value:.2f} over all seeds)"
 
 
 def _notes(scores: pd.DataFrame, source: RewardSource, task: str, found: Beyond, rest: Estimate) -> Iterator[str]:

@@ -215,6 +215,16 @@ def text(given: str) -> str:
     return given
 
 
+@contextmanager
+def refusing() -> Iterator[None]:
+    """Print, where the block fails, a target that snakemake refuses: of none at all it would make the whole study."""
+    try:
+        yield
+    except UserError:
+        print("no-such-run")
+        raise
+
+
 def path(given: str) -> Path:
     """A path that is not empty: that would be the working folder."""
     return Path(text(given))

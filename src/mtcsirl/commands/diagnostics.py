@@ -7,6 +7,8 @@ from mtcsirl.commands.arguments import Verbs, add_study_settings, add_verb, new_
 from mtcsirl.commands.drawing import write_figure
 from mtcsirl.errors import UserError
 
+ENDINGS = (".png", ".pdf", "")
+
 
 def register(verbs: Verbs) -> None:
     """Add the verb."""
@@ -24,6 +26,8 @@ def register(verbs: Verbs) -> None:
 
 
 def _draw(parsed: argparse.Namespace) -> None:
+    if parsed.output.suffix not in ENDINGS:
+        raise UserError(f"--output {parsed.output}: a figure is written as .png and .pdf; name one of them")
     from mtcsirl.figures.diagnostics import caption, draw
     from mtcsirl.figures.style import look, quantity
     from mtcsirl.files import storage

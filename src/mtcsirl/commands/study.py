@@ -15,10 +15,12 @@ from mtcsirl.commands.arguments import (
     new_file,
     path,
     positive,
+    refusing,
     study_settings,
 )
 from mtcsirl.commands.status import aligned
 from mtcsirl.errors import UserError
+from mtcsirl.files.console import plain
 from mtcsirl.study.ablations import ABLATIONS
 from mtcsirl.study.design import ARTEFACTS, design
 
@@ -65,7 +67,7 @@ def register(verbs: Verbs) -> None:
         needs="a results folder",
         writes="nothing",
     )
-    check.add_argument("folder", type=Path, metavar="FOLDER", help="for example results")
+    check.add_argument("folder", type=path, metavar="FOLDER", help="for example results")
 
     differences = add_verb(
         verbs,
@@ -152,6 +154,11 @@ def _print_artefacts(settings: "Settings", rates: "Rates") -> None:
 
 
 def _target(parsed: argparse.Namespace) -> None:
+    with refusing():
+        _print_targets(parsed)
+
+
+def _print_targets(parsed: argparse.Namespace) -> None:
     from mtcsirl.files.identity import marker
     from mtcsirl.study.keys import identity_of
 
@@ -172,7 +179,7 @@ def _verify(parsed: argparse.Namespace) -> None:
 
     found = list(faults(parsed.folder))
     for fault in found:
-        print(f"delete {fault.path}: {fault.why}")
+        print(plain(f"delete {fault.path}: {fault.why}"))
     if found:
         raise UserError(f"{parsed.folder}: {len(found)} faults; delete what is listed and make it again")
     print(f"{parsed.folder}: every file is what its run wrote")

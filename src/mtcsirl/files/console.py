@@ -18,6 +18,11 @@ from pathlib import Path
 from typing import Any
 
 
+def plain(text: str) -> str:
+    """``text`` on one line and without what a terminal would act on: names in strangers' files may hold anything."""
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in " ".join(text.split("\n")))
+
+
 class PatientFile(io.FileIO):
     """A stream's file; after its first failure it takes what is written and drops it. ``failure`` says why."""
 

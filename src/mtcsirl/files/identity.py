@@ -109,6 +109,8 @@ def read_record(folder: Path | str) -> Record | None:
         UserError: it is unreadable.
     """
     path = Path(folder) / FILE
+    if path.exists() and not path.is_file():  # a pipe or a device would be read for ever
+        raise UserError(f"{path}: not a readable identity (no plain file); {REMAKE}")
     try:
         return parse_record(path.read_text(encoding="utf-8"), str(path))
     except FileNotFoundError:
@@ -167,6 +169,8 @@ def not_kept(folder: Path, record: Record) -> frozenset[str]:
 
     A note of another run, or an unreadable one, excuses nothing.
     """
+    if not (folder / NOTE).is_file():
+        return frozenset()
     try:
         said = json.loads((folder / NOTE).read_text(encoding="utf-8"))
         if said["identity"] == record.identity.hash and said["bytes"] == record.bytes:

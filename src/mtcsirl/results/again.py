@@ -11,9 +11,9 @@ import pandas as pd
 
 from mtcsirl.episodes.gates import stochastic_means
 from mtcsirl.errors import UserError
-from mtcsirl.files.identity import FILE, NOTE, Identity, Record, checksum, differences, read_record
+from mtcsirl.files.identity import FILE, NOTE, Record, checksum, read_record
 from mtcsirl.files.storage import read_csv
-from mtcsirl.results.archive import Archived, read
+from mtcsirl.results.archive import Archived, another, read
 from mtcsirl.results.packing import PROVENANCE
 from mtcsirl.results.soundness import foreign
 from mtcsirl.settings import Settings
@@ -31,6 +31,8 @@ READ: Mapping[str, frozenset[str]] = {
 """The files that a stage reads of the runs that it needs."""
 EVALUATION = "evaluation.csv"
 COMPARED = ("success", "velocity", "action_norm")
+MEASURED = ("policy", "kept", "episode", "metric", "value")
+"""Columns of an evaluation that a mean is taken from."""
 
 
 def draw(known: Mapping[str, Archived], study: Runs, agents: int, irl_runs: int, seed: int) -> list[AnyRun]:
@@ -71,7 +73,7 @@ def refuse_others(drawn: Iterable[AnyRun], known: Mapping[str, Archived], settin
     """
     for run in _from_the_first(drawn):
         if run.folder in known:
-            why = _another(known[run.folder].record.identity, identity_of(run, settings))
+            why = another(known[run.folder].record.identity, identity_of(run, settings))
             if why:
                 raise UserError(
                     f"{run.folder}: {why}; take the settings, scale and code that the archive was made with"
@@ -83,14 +85,6 @@ def _from_the_first(drawn: Iterable[AnyRun]) -> Iterator[Run[Any]]:
     for run in drawn:
         yield from _from_the_first(run.needs.values())  # type: ignore[arg-type]
         yield run
-
-
-def _another(archived: Identity, other: Identity) -> str:
-    """The first difference between two runs; empty if there is none."""
-    if archived.hash == other.hash:
-        return ""
-    first = next(differences(archived, other), f"identity: {archived.hash} -> {other.hash}")
-    return f"is another run than the archive's: {first}"
 
 
 class Again(NamedTuple):
@@ -128,8 +122,11 @@ def compare(archive: Path, known: Mapping[str, Archived], results: Path) -> Comp
     rows = read(archive, "evaluation") if any(EVALUATION in other for other in others.values()) else pd.DataFrame()
     found = []
     for folder, other in others.items():
-        apart = _apart(rows[rows["folder"] == folder], results / folder) if EVALUATION in other else {}
-        found.append(Again(folder, len(known[folder].record.files), other, apart))
+        try:
+            apart = _apart(rows, folder, archive, results / folder) if EVALUATION in other else {}
+            found.append(Again(folder, len(known[folder].record.files), other, apart))
+        except UserError as error:
+            left_out.append((folder, str(error)))
     return Comparison(tuple(found), tuple(left_out))
 
 
@@ -141,7 +138,7 @@ def _made_again(folder: Path, run: Archived) -> Record:
     """
     record = read_record(folder)
     assert record is not None
-    if why := _another(run.record.identity, record.identity):
+    if why := another(run.record.identity, record.identity):
         raise UserError(why)
     if strange := foreign(record):
         raise UserError(f"{strange[0]!r} is no file that its stage leaves")
@@ -155,10 +152,15 @@ def _made_again(folder: Path, run: Archived) -> Record:
     return record
 
 
-def _apart(rows: pd.DataFrame, folder: Path) -> dict[str, tuple[float, float]]:
-    there, here = _means(rows), _means(read_csv(folder / EVALUATION))
+def _apart(rows: pd.DataFrame, folder: str, archive: Path, again: Path) -> dict[str, tuple[float, float]]:
+    there = _means(rows[rows["folder"] == folder], f"{archive}: its evaluation")
+    here = _means(read_csv(again / EVALUATION), f"its {EVALUATION}")
     return {metric: (there[metric], here[metric]) for metric in COMPARED}
 
 
-def _means(rows: pd.DataFrame) -> dict[str, float]:
-    return stochastic_means(rows.to_dict("records"))  # type: ignore[arg-type]
+def _means(rows: pd.DataFrame, what: str) -> dict[str, float]:
+    lacks = [name for name in MEASURED if name not in rows]
+    found = {} if lacks else stochastic_means(rows.to_dict("records"))  # type: ignore[arg-type]
+    if bad := lacks or [metric for metric in COMPARED if not np.isfinite(found.get(metric, np.nan))]:
+        raise UserError(f"{what} has no numbers for {', '.join(bad)}")
+    return found

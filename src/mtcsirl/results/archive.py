@@ -21,41 +21,37 @@ import pandas as pd
 
 from mtcsirl.errors import UserError
 from mtcsirl.files import storage
-from mtcsirl.files.identity import FILE, NOTE, Record, lost, note, parse_record, read_record, result_files
+from mtcsirl.files.identity import (
+    FILE,
+    NOTE,
+    Record,
+    lost,
+    note,
+    read_record,
+    result_files,
+)
+from mtcsirl.files.lock import HeldError
+from mtcsirl.results.archived import Archived as Archived
+from mtcsirl.results.archived import another as another
+from mtcsirl.results.archived import archived as archived
 from mtcsirl.results.packing import (
     BLOBS,
     EVERY,
     FRAMES,
-    INDEX,
     POINTS,
-    PROVENANCE,
-    TEXTS,
     THINNED,
     Frames,
     by_folder,
     kept,
     packed,
 )
-from mtcsirl.results.parts import AGAIN, FORMAT, MANIFEST, check, frame, frames, number_of, strangers
+from mtcsirl.results.parts import FORMAT, MANIFEST, check, frame, frames, number_of, strangers
 from mtcsirl.results.parts import parts as parts
 from mtcsirl.results.soundness import Told, faults_of_inputs, faults_of_run, files_of, foreign
 from mtcsirl.study.runs import Runs
 
 LEVEL = 19
 """Of zstd: a part is written once and read often."""
-
-
-@dataclass(frozen=True)
-class Archived:
-    """One run in the archive."""
-
-    folder: str
-    part: str
-    record: Record
-    kept: frozenset[str]
-    """Its result files that come back."""
-    provenance: str
-    """SHA-256 of its ``provenance.json``; a run that was made again has another."""
 
 
 @dataclass(frozen=True)
@@ -74,38 +70,25 @@ def policies_kept(study: Runs) -> set[str]:
     return {run.folder for score in study.scores for run in (*score.experts, *score.baselines)}
 
 
-def archived(archive: Path) -> dict[str, Archived]:
-    """The runs of the archive by their folder; of a run that was added twice, the last.
-
-    Raises:
-        UserError: a part is damaged.
-    """
-    return {run.folder: run for part in parts(archive) for run in _of_part(part)}
-
-
-def _of_part(part: Path) -> Iterator[Archived]:
-    check(part)
-    texts, index = frame(part, TEXTS), frame(part, INDEX)
-    names = index[index["kept"]].groupby("folder", observed=True)["file"].agg(frozenset).to_dict()
-    provenance = index[index["file"] == PROVENANCE].groupby("folder", observed=True)["sha256"].last().to_dict()
-    identities = texts.loc[texts["file"] == FILE, ["folder", "content"]]
-    for folder in sorted({*index["folder"], *texts["folder"]} - set(identities["folder"])):
-        raise UserError(f"{part}: {folder!r} lacks its {FILE}; {AGAIN}")
-    for folder, text in identities.itertuples(index=False):
-        record = parse_record(text, f"{part}: {folder!r}", AGAIN)
-        own = names.get(folder, frozenset()) & frozenset(record.files)
-        yield Archived(folder, part.name, record, own, provenance.get(folder, ""))
-
-
-def add(archive: Path, results: Path, folders: Iterable[str], with_policies: Collection[str]) -> Path | None:
+def add(
+    archive: Path,
+    results: Path,
+    folders: Iterable[str],
+    with_policies: Collection[str],
+    *,
+    replace: bool = False,
+) -> Path | None:
     """Add finished runs that the archive lacks as a new part; returns it, or None if there is nothing to add.
 
     A run that it holds with the same bytes is left out, one that was made again is added again. ``with_policies``:
-    folders whose policies are kept too.
+    folders whose policies are kept too; ``replace``: also runs of other settings, code or inputs than those it holds.
 
     Raises:
-        UserError: a run is not what its record says, or would not come back byte for byte.
+        UserError: a run is not what its record says, or would not come back byte for byte; it is another one than the
+            archive's and ``replace`` is false; the archive would lie among runs.
     """
+    if (archive / FILE).exists() or archive.resolve() == results.resolve():
+        raise UserError(f"{archive}: holds runs; name another folder for the archive")
     with storage.locked(archive):
         for left in archive.glob(".part-*"):
             shutil.rmtree(left, ignore_errors=True)
@@ -113,6 +96,9 @@ def add(archive: Path, results: Path, folders: Iterable[str], with_policies: Col
         new = [folder for folder in folders if _is_new(known.get(folder), results / folder, folder in with_policies)]
         if not new:
             return None
+        for folder in new if not replace else ():
+            if folder in known and (why := another(known[folder].record.identity, _whole(results / folder).identity)):
+                raise UserError(f"{folder}: {why}; nothing was added; name another --archive, or --replace its runs")
         number = max(map(number_of, parts(archive)), default=0) + 1
         part, draft = archive / f"part-{number:04d}", archive / f".part-{number:04d}"
         try:
@@ -169,12 +155,13 @@ def unpack(archive: Path, results: Path, folders: Iterable[str] | None = None) -
     chosen = {part: {folder for folder in free if known[folder].part == part.name} for part in parts(archive)}
     for fault in (fault for part, own in chosen.items() if own for fault in faults_of(part)):
         raise UserError(f"nothing was restored: {fault}")
+    restored = set[str]()
     for part, own in chosen.items():
         if own:
             rows = by_folder({name: found[found["folder"].isin(own)] for name, found in frames(part).items()})
-            for folder in sorted(own):
-                _restore(known[folder], results / folder, rows[folder])
-    return Unpacked(tuple(free), tuple(folder for folder in wanted if folder not in set(free)))
+            restored |= {folder for folder in sorted(own) if _restore(known[folder], results / folder, rows[folder])}
+    ours, others = (tuple(folder for folder in wanted if (folder in restored) is is_ours) for is_ours in (True, False))
+    return Unpacked(ours, others)
 
 
 def _taken(folder: Path) -> bool:
@@ -184,12 +171,17 @@ def _taken(folder: Path) -> bool:
     return not (folder / NOTE).is_file() and (bool(result_files(folder)) or any(folder.glob("checkpoint*")))
 
 
-def _restore(run: Archived, target: Path, own: Frames) -> None:
-    """The note first and the record last, so that whatever is between them is known to be unfinished."""
+def _restore(run: Archived, target: Path, own: Frames) -> bool:
+    """The note first and the record last, so that whatever is between them is known to be unfinished.
+
+    False: a job holds the folder, or has been there meanwhile.
+    """
     files = files_of(own)
     said = note(run.record, set(run.record.files) - set(files)).encode()
     last = files.pop(FILE)
-    with storage.locked(target):
+    with suppress(HeldError), storage.locked(target):
+        if _taken(target):
+            return False
         written: list[Path] = []
         try:
             for name, content in {NOTE: said, **files, FILE: last}.items():
@@ -200,6 +192,8 @@ def _restore(run: Archived, target: Path, own: Frames) -> None:
                 with suppress(OSError):
                     storage.remove(path)
             raise OSError(error.errno, error.strerror, str(written[-1])) from error
+        return True
+    return False
 
 
 def verify(archive: Path, folders: Collection[str] | None = None) -> list[str]:

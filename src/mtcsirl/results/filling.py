@@ -1,5 +1,6 @@
 """Files that an archive had not kept, taken into restored folders from runs that were made again elsewhere."""
 
+from collections.abc import Iterable
 from pathlib import Path
 from typing import NamedTuple
 
@@ -13,50 +14,68 @@ class Filled(NamedTuple):
     """What became of the files that restored folders lacked, as paths below the results."""
 
     taken: tuple[str, ...]
-    other: tuple[str, ...]
-    """Made again with other bytes, and left alone."""
+    left: tuple[tuple[str, str], ...]
+    """Files or folders that were left alone, and why."""
     missing: tuple[str, ...]
     """Not made again."""
 
 
-def fill(results: Path, again: Path) -> Filled:
-    """Copy what restored folders below ``results`` lack from the same folders below ``again``, if the bytes are theirs.
+def fill(results: Path, again: Path, folders: Iterable[str]) -> Filled:
+    """Copy what restored ``folders`` below ``results`` lack from those below ``again``, if the bytes are theirs.
 
     A run that was made again need not have the archive's bytes in every file, nor be finished: a file counts if its
     SHA-256 is the one that the restored run's identity has of it. So what has read the file stays as it is.
 
     Raises:
-        UserError: ``again`` is no folder, or a restored run names files that its stage does not leave.
-        HeldError: another process holds a folder that lacks a file.
+        UserError: one of the two is no folder.
     """
-    if not again.is_dir():
-        raise UserError(f"{again}: no such folder; name the results folder below which runs were made again")
-    found: dict[str, list[str]] = {kind: [] for kind in Filled._fields}
-    for note in sorted(results.rglob(NOTE)):
-        folder = note.parent
-        record = read_record(folder)
-        if record is None:
-            continue
-        if strange := foreign(record):
-            raise UserError(f"{folder / strange[0]}: no file that its stage leaves; delete {folder} and restore it")
-        place = folder.relative_to(results)
-        for name in _lacking(folder, record):
-            became = _take(again / place / name, folder, name, record.files[name])
-            found[became].append(str(place / name))
-    return Filled(**{kind: tuple(paths) for kind, paths in found.items()})
+    for one, what in ((results, "below which runs were restored"), (again, "below which runs were made again")):
+        if not one.is_dir():
+            raise UserError(f"{one}: no such folder; name the results folder {what}")
+    taken: list[str] = []
+    left: list[tuple[str, str]] = []
+    missing: list[str] = []
+    for folder in folders:
+        try:
+            absent = _lacking(results / folder)
+            for name, sha256 in absent.items():
+                path, source = f"{folder}/{name}", again / folder / name
+                if not source.is_file():
+                    missing.append(path)
+                elif checksum(source) != sha256:
+                    left.append((path, "other bytes than the archive's"))
+                else:
+                    _copy(source, results / folder, name)
+                    taken.append(path)
+        except UserError as error:
+            left.append((folder, str(error)))
+    return Filled(tuple(taken), tuple(left), tuple(missing))
 
 
-def _lacking(folder: Path, record: Record) -> list[str]:
-    absent = sorted(not_kept(folder, record) & set(record.files))
-    return [name for name in absent if not (folder / name).is_file()]
+def only_restored(again: Path, paths: Iterable[str]) -> list[str]:
+    """Of files that were not made again those whose folders were restored below ``again`` too."""
+    return [path for path in paths if any((again / parent / NOTE).is_file() for parent in Path(path).parents[:2])]
 
 
-def _take(source: Path, folder: Path, name: str, sha256: str) -> str:
-    """Copy a file of these bytes into the run's folder under its name; what became of it."""
-    if not source.is_file():
-        return "missing"
-    if checksum(source) != sha256:
-        return "other"
+def _lacking(folder: Path) -> dict[str, str]:
+    """SHA-256 of each file that a restored folder lacks; nothing of other folders.
+
+    Raises:
+        UserError: its record is damaged, or names what a run of its stage does not leave.
+    """
+    record = read_record(folder) if (folder / NOTE).is_file() else None
+    if record is None:
+        return {}
+    if strange := foreign(record):
+        raise UserError(f"{strange[0]!r} is no file that its stage leaves; delete {folder} and restore it")
+    return _absent(folder, record)
+
+
+def _absent(folder: Path, record: Record) -> dict[str, str]:
+    names = sorted(not_kept(folder, record) & set(record.files))
+    return {name: record.files[name] for name in names if not (folder / name).is_file()}
+
+
+def _copy(source: Path, folder: Path, name: str) -> None:
     with storage.locked(folder):
         storage.write_bytes(folder / name, source.read_bytes())
-    return "taken"

@@ -23,6 +23,7 @@ SHARED = ("sac", "expert")
 """Sets whose agents are the same in every IRL run: drawn once for all of them."""
 Counts = NDArray[np.int64]
 _PAIRS = (("f", "f"), ("c", "c"), ("t", "t"), ("f", "c"), ("f", "t"), ("c", "t"))
+ROUNDING = 1e-12
 _LIMIT = 1 - 1e-9
 """A correlation of 1 has no Fisher z."""
 
@@ -47,14 +48,22 @@ def given_task(fc: Array, ft: Array, ct: Array) -> Array:
 def episode_sums(points: pd.DataFrame) -> pd.DataFrame:
     """Count and sums of f, c, t and their products per (seed, transitions, agent, episode) of single transitions.
 
-    f, c and t are centred per seed first, which no correlation sees and floating point does.
+    f, c and t are centred and scaled per seed first, which no correlation sees and floating point does. One that varies
+    by no more than its rounding does not vary.
     """
     names = {"f": "learned", "c": "truth", "t": "task_reward"}
     columns = {name: points[column].astype(float) for name, column in names.items()}
-    centred = {name: values - values.groupby(points["seed"]).transform("mean") for name, values in columns.items()}
+    centred = {name: _scaled(values, points["seed"]) for name, values in columns.items()}
     sums = points[["seed", "transitions", "agent", "episode"]].assign(n=1.0, **centred)
     sums = sums.assign(**{a + b: centred[a] * centred[b] for a, b in _PAIRS})
     return sums.groupby(["seed", "transitions", "agent", "episode"], sort=True).sum().reset_index()
+
+
+def _scaled(values: pd.Series, seeds: pd.Series) -> pd.Series:
+    of_seed = values.groupby(seeds)
+    spread, size = of_seed.transform("std", ddof=0), values.abs().groupby(seeds).transform("max")
+    varies = spread > ROUNDING * size
+    return (values - of_seed.transform("mean")).where(varies, 0.0) / spread.where(varies, 1.0)
 
 
 def correlations(sums: Array) -> Correlations:
@@ -87,6 +96,10 @@ class Beyond:
     raw: Estimate
     agents: int
     episodes: int
+    flat: tuple[int, ...] = ()
+    """IRL seeds in which one of the rewards does not vary."""
+    nothing: tuple[int, ...] = ()
+    """IRL seeds in which nothing of one of the rewards is left beside r_task, or which are flat."""
 
 
 def beyond_task(points: pd.DataFrame, generator: np.random.Generator, *, resamples: int = 1000) -> Beyond:
@@ -118,7 +131,13 @@ def beyond_task(points: pd.DataFrame, generator: np.random.Generator, *, resampl
         raw=over_seeds("raw", fisher=True),
         agents=_agents(sums),
         episodes=len(sums),
+        flat=_unknown(parts, [one.raw[0] for one in found]),
+        nothing=_unknown(parts, [one.partial[0] for one in found]),
     )
+
+
+def _unknown(parts: Sequence[pd.DataFrame], values: Sequence[float]) -> tuple[int, ...]:
+    return tuple(int(part["seed"].iloc[0]) for part, value in zip(parts, values, strict=True) if np.isnan(value))
 
 
 def _agents(sums: pd.DataFrame) -> int:

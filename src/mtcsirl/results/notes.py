@@ -37,7 +37,10 @@ def study_note(settings: Settings) -> Note:
     """What every table says first: scale and seeds, or that smoke numbers mean nothing."""
     seeds = ", ".join(map(str, settings.seeds))
     count = "1 seed" if len(settings.seeds) == 1 else f"{len(settings.seeds)} seeds"
-    return Note("scale", *(scale_notes(settings.scale) or [f"scale {settings.scale}; {count} ({seeds})"]))
+    text = f"scale {settings.scale}; {count} ({seeds})"
+    if len(settings.irl_seeds) < len(settings.seeds):
+        text += f"; new agents share the rewards of {len(settings.irl_seeds)} IRL seeds: intervals are too short"
+    return Note("scale", *(scale_notes(settings.scale) or [text]))
 
 
 def deviation_notes(settings: Settings) -> tuple[Note, ...]:

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import pandas as pd
+from pyarrow import ArrowException
 
 from mtcsirl.errors import UserError
 from mtcsirl.files import storage
@@ -65,7 +66,7 @@ def check(part: Path) -> None:
         UserError: one was changed, lost or put there.
     """
     if (part.parent / FILE).exists():
-        raise UserError(f"{part.parent / FILE}: no file of an archive; delete it")
+        raise UserError(f"{part.parent / FILE}: no file of an archive, but of a run; move it out of there")
     said = _parsed(part / MANIFEST)
     if not isinstance(said, dict) or said.get("format") != FORMAT or not isinstance(said.get("files"), dict):
         raise UserError(f"{part / MANIFEST}: not the manifest of an archive; {AGAIN}")
@@ -112,7 +113,11 @@ def frame(part: Path, name: str) -> pd.DataFrame:
         rows = storage.read_parquet(path)
     except UserError as error:
         raise UserError(f"{path}: not a readable Parquet file; {AGAIN}") from error
-    for fault in _faults_of_columns(name, rows):
+    try:
+        faults = list(_faults_of_columns(name, rows))
+    except (ValueError, ArrowException) as error:  # texts are only decoded when they are looked at
+        raise UserError(f"{path}: not a readable Parquet file; {AGAIN}") from error
+    for fault in faults:
         raise UserError(f"{path}: {fault}; {AGAIN}")
     return rows
 

@@ -103,7 +103,8 @@ def contrast(*terms: tuple[float, Summary], constant: float = 0.0, confidence: f
     error = float(np.sqrt(sum(parts)))
     if error == 0:
         return Welch(value, value, value, np.nan, np.nan, 1.0 if value == 0 else 0.0)
-    degrees = sum(parts) ** 2 / sum(v**2 / (summary.n - 1) for v, (_, summary) in zip(parts, terms, strict=True))
+    shares = [v / sum(parts) for v in parts]  # whose squares are numbers, however small the parts
+    degrees = 1 / sum(share**2 / (summary.n - 1) for share, (_, summary) in zip(shares, terms, strict=True))
     half = _t(confidence, degrees) * error
     t = value / error
     return Welch(value, value - half, value + half, float(t), degrees, float(2 * stats.t.sf(abs(t), degrees)))

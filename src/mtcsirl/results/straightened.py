@@ -1,4 +1,4 @@
-"""What is left of two rewards once any function of the task reward is taken away, not only a straight line."""
+"""What is left of two rewards once any bend in the task reward is taken away, not only a straight line."""
 
 import numpy as np
 import pandas as pd
@@ -15,9 +15,9 @@ def within_tenths(points: pd.DataFrame) -> pd.DataFrame:
     """``points`` with ``learned`` and ``truth`` less a cubic in ``task_reward`` within each tenth of its values.
 
     The partial correlation takes one straight line away, so that a reward which is a bent function of r_task alone,
-    such as -r_task^3, keeps some of it. Ten cubics follow any bend. They are fitted per seed, with every set of
-    transitions as an equal part; ``task_reward`` becomes 0, for it is used up. A reward of which nothing is left but
-    the error of the fit becomes 0 as well.
+    such as -r_task^3, keeps some of it. Ten cubics follow any bend, but no jump within a tenth. They are fitted per
+    seed, with every set of transitions as an equal part; ``task_reward`` becomes 0, for it is used up. A reward of
+    which nothing is left but the error of the fit becomes 0 as well.
 
     Args:
         points: rows (seed, transitions, learned, truth, task_reward).

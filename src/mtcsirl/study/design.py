@@ -21,7 +21,7 @@ FIGURE_TASKS = {
 """Learning curves of section 5.1; the paper's text and captions disagree on the tasks, so all five exist."""
 
 
-def _irl_seed(settings: Settings, seed: int) -> int:
+def irl_seed(settings: Settings, seed: int) -> int:
     """The seed of the IRL run whose reward the transfer agent of ``seed`` gets."""
     if seed in settings.irl_seeds:
         return seed
@@ -73,7 +73,7 @@ def _single_target_curves(settings: Settings, task: str) -> Iterator[AnyRun]:
     yield from _baselines(settings, [task])
     for cs in settings.cs_rewards:
         for seed in settings.seeds:
-            yield Transfer(_single_irl(settings, task, cs, _irl_seed(settings, seed)), task, EVALUATION_TARGET, seed)
+            yield Transfer(_single_irl(settings, task, cs, irl_seed(settings, seed)), task, EVALUATION_TARGET, seed)
 
 
 def _single_target_scores(settings: Settings, cs_reward: str, tasks: Iterable[str]) -> Iterator[AnyRun]:
@@ -97,7 +97,7 @@ def _cross_transfer(settings: Settings, cs_reward: str) -> Iterator[AnyRun]:
     yield from _baselines(settings, tasks)
     for source in tasks if cs_reward in settings.cs_rewards else ():
         for seed in settings.seeds:
-            irl = _multi_target_irl(settings, source, cs_reward, _irl_seed(settings, seed))
+            irl = _multi_target_irl(settings, source, cs_reward, irl_seed(settings, seed))
             yield from (Transfer(irl, task, EVALUATION_TARGET, seed) for task in tasks)
 
 
@@ -105,7 +105,7 @@ def _unseen(settings: Settings, methods: Iterable[str], cs_rewards: Iterable[str
     for method in methods:
         for cs in cs_rewards:
             for seed in settings.seeds:
-                irl = _multi_task_irl(settings, method, cs, _irl_seed(settings, seed))
+                irl = _multi_task_irl(settings, method, cs, irl_seed(settings, seed))
                 for task in settings.multi_task.unseen_tasks:
                     yield Transfer(irl, task, EVALUATION_TARGET, seed)
 
@@ -123,7 +123,7 @@ def _table_4(settings: Settings) -> Iterator[AnyRun]:
     chosen = settings.multi_task
     for cs in settings.cs_rewards:
         for seed in settings.seeds:
-            irl = _multi_task_irl(settings, "mt_csirl_lt", cs, _irl_seed(settings, seed))
+            irl = _multi_task_irl(settings, "mt_csirl_lt", cs, irl_seed(settings, seed))
             yield from (Transfer(irl, task, chosen.train_targets[0], seed) for task in chosen.train_tasks)
 
 

@@ -15,7 +15,7 @@ from mtcsirl.study.rates import Rates
 from mtcsirl.study.readings import gate_of, provenance_of
 from mtcsirl.study.runs import AnyRun, Runs
 from mtcsirl.study.screen import first_of, last_said, short
-from mtcsirl.study.standing import DONE, INCOMPLETE, STALE, own_reasons, standing
+from mtcsirl.study.standing import DONE, INCOMPLETE, STALE, Standing, own_reasons, standing
 
 RUNNING, FAILED, WAITING = "running", "failed", "waiting"
 STATES = (DONE, STALE, RUNNING, FAILED, WAITING)
@@ -54,11 +54,16 @@ def run_status(run: AnyRun, settings: Settings) -> RunStatus:
         return _finished(run, settings)
     if found.state == INCOMPLETE:
         return RunStatus(run, FAILED, says="; ".join(found.why))
-    if log.is_file():
+    if log.is_file() and not _of_the_last_run(log, found):
         starting = time.time() - log.stat().st_mtime < STARTING_SECONDS
         if starting or log.stat().st_size:  # `snakemake --touch` leaves empty logs
             return RunStatus(run, RUNNING if starting else FAILED, says=last_said(log))
     return RunStatus(run, STALE if found.state == STALE else WAITING, says=first_of(own_reasons(found.why)))
+
+
+def _of_the_last_run(log: Path, found: Standing) -> bool:
+    """Whether a log is that of the run whose record stands there, made from what its inputs were then."""
+    return found.state == STALE and found.record is not None and log.stem == found.record.identity.hash
 
 
 def before_it_starts(study: Runs, settings: Settings) -> str:

@@ -63,6 +63,8 @@ class Cell:
     marks: dict[str, int] = field(default_factory=dict)
     folders: tuple[str, ...] = ()
     """Of the runs whose rows were averaged."""
+    unaveraged: int = 0
+    """Usable agents of seeds that lack another task."""
 
     @property
     def comparison(self) -> Comparison:
@@ -128,7 +130,9 @@ def make_cell(rows: pd.DataFrame, metric: str, paper: Summary, scale: float = 1.
     """
     rows = select(rows, kept=KEPT)
     chosen = select(rows, metric=metric, policy="stochastic")
-    ours = summarise(per_seed(chosen) / scale)
+    means = per_seed(chosen)
+    whole = chosen[chosen["seed"].isin(list(means.dropna().index))]
+    ours = summarise(means / scale)
     greedy = per_seed(select(rows, metric=metric, policy="deterministic")) / scale
     return Cell(
         ours=ours,
@@ -138,21 +142,22 @@ def make_cell(rows: pd.DataFrame, metric: str, paper: Summary, scale: float = 1.
         deterministic=summarise(greedy).mean,
         iqm=_interquartile(chosen, scale),
         expected=chosen["seed"].nunique(),
-        marks=_marks(chosen),
-        folders=tuple(sorted(set(chosen.loc[chosen["value"].notna(), "folder"]))),
+        marks=_marks(chosen, whole),
+        folders=tuple(sorted(set(whole["folder"]))),
+        unaveraged=int(chosen["value"].notna().sum() - len(whole)),
     )
 
 
-def _marks(rows: pd.DataFrame) -> dict[str, int]:
-    """Agents in doubt by kind, none that are 0; ``rows``: one per agent."""
+def _marks(rows: pd.DataFrame, averaged: pd.DataFrame) -> dict[str, int]:
+    """Agents in doubt by kind, none that are 0; ``rows``: one per agent, ``averaged``: those that count in the mean."""
     status = rows["status"]
     counts = {
-        "below": (status == BELOW_GATE).sum(),
+        "below": (averaged["status"] == BELOW_GATE).sum(),
         "missing": (status == MISSING).sum(),
         "doubtful": status.isin([DUPLICATED, FOREIGN]).sum(),
         "incomplete": (status == INCOMPLETE).sum(),
         "stale": (status == STALE).sum(),
-        "diverged": (rows["diverged"] > 0).sum(),
+        "diverged": (averaged["diverged"] > 0).sum(),
     }
     return {kind: int(count) for kind, count in counts.items() if count}
 
@@ -172,9 +177,9 @@ def _interquartile(rows: pd.DataFrame, scale: float) -> Estimate:
     return stratified_bootstrap([values], interquartile_mean, np.random.default_rng(0), resamples=RESAMPLES)
 
 
-def per_seed(rows: pd.DataFrame) -> np.ndarray:
-    """Mean over tasks of each seed; NaN if one of its tasks is not usable."""
-    return matrix(rows).mean(axis=1, skipna=False).to_numpy(dtype=float)
+def per_seed(rows: pd.DataFrame) -> pd.Series:
+    """Mean over tasks [seed]; NaN if one of its tasks is not usable."""
+    return matrix(rows).mean(axis=1, skipna=False)
 
 
 def _spread(summary: Summary, digits: int, spread_digits: int, factor: float) -> str:

@@ -120,6 +120,8 @@ class Layout:
         lacking = sum(cell.ours.n < cell.expected for cell in self.cells)
         if lacking:
             yield Note("gap", f"incomplete: {lacking} of {len(self.cells)} cells lack seeds")
+        if any(cell.unaveraged for cell in self.cells):
+            yield Note("gap", "a seed that lacks one of the tasks is left out, with its agents on the others")
 
     def _lines(
         self, texts: Callable[[Row], tuple[list[str], list[int]]], ours: Sequence[int] = (), results: Path = Path()
