@@ -166,7 +166,8 @@ def test_the_seed_that_says_nothing_is_named():
     assert {unit.reason for unit in found.units} == {"IRL seed 3: the learned or the true reward does not vary"}
     spent = in_seed(3, lambda f, c, t: (-t, c, t))
     for unit in finding("C9", settings=VELOCITY, transitions=spent).units:
-        assert unit.reason.startswith("IRL seed 3: r_task says all that the learned or the true reward does (r = 0.")
+        assert unit.reason.startswith("IRL seed 3: r = 0.")
+        assert unit.reason.endswith("says nothing beyond r_task: the learned or the true reward is a function of it")
     every = points(make=lambda *made: (lambda f, c, t: (0 * f, c, t))(*rewards(*made)), settings=VELOCITY)
     assert {unit.reason for unit in finding("C9", settings=VELOCITY, transitions=every).units} == {
         "the learned or the true reward does not vary"

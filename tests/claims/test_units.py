@@ -31,7 +31,7 @@ def test_closing_by_hand():
 
 def test_falling_short_and_overshooting_count_alike():
     frame = pd.DataFrame({"velocity": [0.7, 0.9], "success": [1.0, 1.0]}, index=[0, 1])
-    group = Group("transfer", {"reach": frame}, "velocity", 0.8, 10)
+    group = Group("transfer", "new agents", {"reach": frame}, "velocity", 0.8, 10)
     assert group.distance.mean == pytest.approx(0.1)
 
 
@@ -169,7 +169,7 @@ def test_not_as_strongly_as_the_ground_truth_is_noted(cs_reward, ours, answer):
 
     unit = next(u for u in finding("C7", change=at_speed).units if u.cs_reward == cs_reward)
     assert (unit.what, unit.state) == ("all unseen tasks", "not judged")
-    assert f'"not as strongly as the ground truth": {answer}; d is +0.0' in unit_texts(unit)["notes"]
+    assert f'"not as strongly as the ground truth": {answer}; d less the experts\' is +0.0' in unit_texts(unit)["notes"]
 
 
 def test_every_claim_with_agents_has_an_effect_size(findings):

@@ -123,7 +123,8 @@ def _nothing(found: Beyond) -> str:
     where = "" if len(seeds) == found.partial.n else f"IRL seed {', '.join(map(str, seeds))}: "
     if found.flat:
         return f"{where}the learned or the true reward does not vary"
-    return f"{where}r_task says all that the learned or the true reward does (r = {found.raw.value:.2f} over all seeds)"
+    all_seeds = f"r = {found.raw.value:.2f}" + (" of all seeds" if where else "")
+    return f"{where}{all_seeds} says nothing beyond r_task: the learned or the true reward is a function of it"
 
 
 def _notes(scores: pd.DataFrame, source: RewardSource, task: str, found: Beyond, rest: Estimate) -> Iterator[str]:
