@@ -102,6 +102,18 @@ def test_no_single_file_joins_a_run(place: str, here: Path, capsys: pytest.Captu
     assert "s0.png" not in capsys.readouterr().err, "it is the run that is no good"
 
 
+def test_a_figure_is_no_text(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    before = contents(here)
+    assert cli.main(["draw-diagnostics", "--run", "run", "--output", "s0.txt"]) == 2
+    assert "--output s0.txt: a figure is written as .png and .pdf; name one of them" in capsys.readouterr().err
+    assert contents(here) == before
+
+
+def test_nothing_is_no_folder_to_verify(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["verify", ""]) == 2
+    assert "must not be empty" in capsys.readouterr().err
+
+
 def test_a_single_file_replaces_none_that_is_named_as_a_runs(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     finished(here / "copy")
     assert cli.main(["draw-diagnostics", "--run", "copy", "--output", "copy/reward.json"]) == 2

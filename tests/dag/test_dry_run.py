@@ -69,7 +69,11 @@ def test_one_run_can_be_asked_for(
     assert cli.main(["target", folder, "sac/reach-wall-t0/s0"]) == 0
     assert len(capsys.readouterr().out.split()) == 2
     assert cli.main(["target", folder, "expert/velocity/reach-t1/s7"]) == 2
-    assert "is no run of the study at scale desk" in capsys.readouterr().err
+    said = capsys.readouterr()
+    assert "is no run of the study at scale desk" in said.err
+    done = planner("-n", *said.out.split())
+    assert done.returncode != 0, "nothing to ask for would be the whole study"
+    assert "no-such-run" in done.stdout + done.stderr
 
 
 def test_a_run_outside_the_study_is_refused(planner: Snakemake) -> None:

@@ -5,11 +5,13 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
+import pandas as pd
 import pytest
 
 from mtcsirl import cli
 from mtcsirl.errors import UserError
-from mtcsirl.files.identity import FILE, NOTE, dumps, read_record
+from mtcsirl.files import storage
+from mtcsirl.files.identity import FILE, NOTE, checksum, dumps, read_record
 from mtcsirl.results import again, archive
 from mtcsirl.settings import Settings
 from mtcsirl.study.keys import identity_of
@@ -148,6 +150,8 @@ def test_the_verbs_refuse_and_list_other_runs(whole: Path, tmp_path: Path, capsy
     (line,) = capsys.readouterr().err.splitlines()
     assert "is another run than the archive's: sac.discount: 0.97 -> 0.9" in line
     assert not (tmp_path / "again").exists()
+    assert cli.main(["archive", "draw", "--agents", "99", *words]) == 2
+    assert capsys.readouterr().out == "no-such-run\n", "nothing to ask for would be the whole study"
     write(BY_FOLDER[EXPERT], other)
     assert cli.main(["archive", "compare", *words]) == 2
     said = capsys.readouterr()
@@ -181,3 +185,34 @@ def test_the_verbs(whole: Path, tmp_path: Path, capsys: pytest.CaptureFixture[st
     assert (Path(at.results) / drawn.folder / FILE).is_file()
     assert cli.main(draw) == 2
     assert "is there; choose a folder without it" in capsys.readouterr().err
+
+
+def rewritten(folder: Path, change: Callable[[pd.DataFrame], pd.DataFrame]) -> None:
+    """An evaluation of another kind, of which the record knows."""
+    rows = change(storage.read_csv(folder / "evaluation.csv"))
+    storage.remove(folder / "evaluation.csv")
+    storage.write_csv(folder / "evaluation.csv", rows)
+    record = read_record(folder)
+    assert record is not None
+    files = dict(record.files) | {"evaluation.csv": checksum(folder / "evaluation.csv")}
+    (folder / FILE).write_text(dumps(replace(record, files=files)))
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        (lambda rows: rows.drop(columns="policy"), "its evaluation.csv has no numbers for policy"),
+        (lambda rows: rows.iloc[:0], "its evaluation.csv has no numbers for success"),
+        (lambda rows: rows[rows["metric"] != "velocity"], "its evaluation.csv has no numbers for velocity"),
+    ],
+)
+def test_an_evaluation_of_another_kind_is_listed(
+    change: Callable[[pd.DataFrame], pd.DataFrame], says: str, whole: Path, tmp_path: Path
+) -> None:
+    write(BY_FOLDER[EXPERT], settings(tmp_path))
+    rewritten(tmp_path / EXPERT, change)
+    found = again.compare(whole, archive.archived(whole), tmp_path)
+    assert found.made == ()
+    ((folder, why),) = found.left_out
+    assert folder == EXPERT
+    assert why.startswith(says)

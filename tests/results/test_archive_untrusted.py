@@ -13,6 +13,8 @@ from pathlib import Path
 from typing import Any
 
 import pandas as pd
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 
 from mtcsirl import cli
@@ -52,6 +54,11 @@ def edit(archive_: Path, frame: str, change: Callable[[Frame], Frame]) -> None:
     part = archive_ / "part-0001"
     path = part / f"{frame}.parquet"
     storage.write_parquet(path, change(storage.read_parquet(path)))
+    fit_manifest(part, path)
+
+
+def fit_manifest(part: Path, path: Path) -> None:
+    """Give the manifest the checksum of a changed frame."""
     manifest = storage.read_json(part / "manifest.json")
     storage.write_json(part / "manifest.json", manifest | {"files": {**manifest["files"], path.name: _sum(path)}})
 
@@ -223,6 +230,16 @@ def test_rows_of_a_file_that_a_run_does_not_have_are_refused(copy, tmp_path, fra
     folder = SHOWN.folder
     edit(copy, frame, lambda rows: pd.concat([rows, rows.iloc[:1].assign(folder=folder)], ignore_index=True))
     refused(copy, f"{folder}: rows in {frame} of a file", tmp_path / "out")
+
+
+def test_text_that_is_no_text_is_refused(copy, tmp_path):
+    """Parquet says that it is UTF-8; nothing looks until a cell is asked for."""
+    path = copy / "part-0001" / "texts.parquet"
+    table = pq.read_table(path)
+    bad = pa.array([b"\xff\xfe"] * len(table), pa.binary()).view(pa.string())
+    pq.write_table(table.set_column(table.column_names.index("content"), "content", bad), path)
+    fit_manifest(path.parent, path)
+    refused(copy, "not a readable Parquet file", tmp_path / "out")
 
 
 def test_rows_of_no_run_are_refused(copy, tmp_path):

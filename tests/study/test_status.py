@@ -37,6 +37,21 @@ def test_a_line_says_what_is_done_stale_and_why(settings: Settings) -> None:
     assert "\n" not in line
 
 
+def test_a_run_whose_input_was_made_again_is_stale_whatever_its_log_says(settings: Settings) -> None:
+    demonstrations = next(iter(design(settings).irl_runs)).demonstrations[0]
+    finish(demonstrations.expert, settings)
+    folder = Path(settings.results) / demonstrations.folder
+    finish(demonstrations, settings)
+    record = read_record(folder)
+    assert record is not None
+    storage.write_text(folder / FILE, dumps(replace(record, read=dict.fromkeys(demonstrations.needs, "0" * 16))))
+    log = Path(settings.results) / "logs" / demonstrations.folder / f"{record.identity.hash}.log"
+    storage.write_text(log, "collected\n")
+    os.utime(log, (1, 1))
+    found = run_status(demonstrations, settings)
+    assert (found.state, found.says) == (STALE, "input expert: made again with other bytes")
+
+
 def test_a_stale_run_names_its_first_reasons_and_counts_the_rest(settings: Settings) -> None:
     first, second = design(settings).baselines[:2]
     finish(first, settings, steps=123)
