@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from mtcsirl.claims.evidence import at_least_by_chance
+from mtcsirl.claims.groups import at_least_by_chance
 from mtcsirl.claims.judging import MET, at_least, at_most, closing, staying_below, surely
 from mtcsirl.files.storage import write_json
 from mtcsirl.results.contrasts import fieller, nearness
