@@ -168,9 +168,13 @@ def fail_gates(rows, **key):
     return rows.assign(status=rows["status"].mask(failed, "below gate"))
 
 
-def missing(rows, **key):
+def useless(rows, status, **key):
     gone = rows.index.isin(select(rows, **key).index)
-    return rows.assign(value=rows["value"].mask(gone), status=rows["status"].mask(gone, "missing"))
+    return rows.assign(value=rows["value"].mask(gone), status=rows["status"].mask(gone, status))
+
+
+def missing(rows, **key):
+    return useless(rows, "missing", **key)
 
 
 def replicated(rows):

@@ -6,7 +6,6 @@ import pytest
 
 from mtcsirl.claims.groups import Group
 from mtcsirl.results.notes import study_note
-from mtcsirl.results.rows import select
 from tests.claims.made_up import (
     SAC,
     SETTINGS,
@@ -20,6 +19,7 @@ from tests.claims.made_up import (
     points,
     rewards,
     transfer,
+    useless,
 )
 
 VELOCITY = SETTINGS.model_copy(update={"cs_rewards": ("velocity",)})
@@ -84,11 +84,6 @@ def test_an_ablation_has_as_many_irl_seeds_as_it_trains():
 
 
 # --- evaluations that say nothing ------------------------------------------------------------------------------------
-
-
-def useless(rows, status, **key):
-    gone = rows.index.isin(select(rows, **key).index)
-    return rows.assign(value=rows["value"].mask(gone), status=rows["status"].mask(gone, status))
 
 
 @pytest.mark.parametrize("status", ["incomplete", "duplicated", "foreign"])

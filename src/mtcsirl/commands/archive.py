@@ -147,10 +147,11 @@ def _summary(parsed: argparse.Namespace) -> None:
     for what, number, mib in rows:
         of = f"{number:5} of {planned[what]} runs" if what in planned else f"{mib:8.2f} MiB in {number} parts"
         print(f"{what:24}{of}")
-    if others := set(archived(parsed.archive)) - folders:
+    known = archived(parsed.archive)
+    if others := set(known) - folders:
         print(f"{'other runs':24}{len(others):5}")
     print(f"{'in all':24}{sum(mib for *_, mib in rows):8.2f} MiB")
-    _say_others(archived(parsed.archive), study, study_settings(parsed))
+    _say_others(known, study, study_settings(parsed))
 
 
 def _draw(parsed: argparse.Namespace) -> None:

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from mtcsirl.errors import UserError
 from mtcsirl.files import storage
-from mtcsirl.files.identity import NOTE, Record, checksum, not_kept, read_record
+from mtcsirl.files.identity import NOTE, checksum, not_kept, read_record
 from mtcsirl.results.soundness import foreign
 
 
@@ -68,10 +68,6 @@ def _lacking(folder: Path) -> dict[str, str]:
         return {}
     if strange := foreign(record):
         raise UserError(f"{strange[0]!r} is no file that its stage leaves; delete {folder} and restore it")
-    return _absent(folder, record)
-
-
-def _absent(folder: Path, record: Record) -> dict[str, str]:
     names = sorted(not_kept(folder, record) & set(record.files))
     return {name: record.files[name] for name in names if not (folder / name).is_file()}
 
